@@ -203,6 +203,6 @@ mod tests {
                 assert_eq!(cell.trim(), format!("{:.2}{ei}", f.tr), "{} in {task}", row.title);
             }
         }
-        assert_eq!(page.matches(", paper |").count(), 5, "all rows were compared");
+        assert_eq!(page.matches(", paper |").count(), 6, "all rows were compared");
     }
 }

@@ -62,16 +62,26 @@ fn load_by_task(files: [(TaskId, &[u8]); 8]) -> LoadedPolicy {
 }
 
 /// All bundled helpers.
-static BUNDLED_HELPERS: [BundledHelper; 2] = [
+static BUNDLED_HELPERS: [BundledHelper; 4] = [
     BundledHelper {
         name: "cloned",
         about: "network that imitates infer",
         policy: policy!("cloned"),
     },
     BundledHelper {
+        name: "rl",
+        about: "infer with corrections learned by PPO",
+        policy: policy!("rl"),
+    },
+    BundledHelper {
         name: "rl_paper",
         about: "RL baseline of the paper: single actions from images",
         policy: policies_by_task!("rl_paper"),
+    },
+    BundledHelper {
+        name: "smart_help",
+        about: "rl_paper with a model of the partner: Smart-Help baseline of the paper",
+        policy: policies_by_task!("smart_help"),
     },
 ];
 

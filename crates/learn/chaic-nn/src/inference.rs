@@ -71,6 +71,11 @@ impl Inference {
         &mut self.activations[0].data
     }
 
+    /// Returns the input of the last run.
+    pub fn last_input(&self) -> &[f32] {
+        &self.activations[0].data
+    }
+
     /// Runs all layers on the input. `on_strip(output, first row, rows)` is called for each strip
     /// of each output, from top to bottom; rows have shape [rows, width, channels].
     ///

@@ -89,12 +89,19 @@ impl Learner {
 
     /// Adds the state of parameters and optimizer to a checkpoint.
     pub fn save(&self, checkpoint: &mut Checkpoint) {
-        checkpoint.insert_floats(PARAMETERS, self.parameters.clone());
-        checkpoint.insert_floats(EMA_PARAMETERS, self.ema_parameters.clone());
-        checkpoint.insert_floats(EXP_AVG, self.adam.exp_avg.clone());
-        checkpoint.insert_floats(EXP_AVG_SQ, self.adam.exp_avg_sq.clone());
-        checkpoint.insert_integers(OPTIMIZER_STEPS, vec![self.adam.steps]);
-        checkpoint.insert_doubles(BETA_POWERS, self.adam.beta_powers.to_vec());
+        self.save_as("", checkpoint);
+    }
+
+    /// As [`Learner::save`], with a prefix to the names of the sections, so that a checkpoint holds
+    /// several learners.
+    pub fn save_as(&self, prefix: &str, checkpoint: &mut Checkpoint) {
+        let name = |section: &str| format!("{prefix}{section}");
+        checkpoint.insert_floats(&name(PARAMETERS), self.parameters.clone());
+        checkpoint.insert_floats(&name(EMA_PARAMETERS), self.ema_parameters.clone());
+        checkpoint.insert_floats(&name(EXP_AVG), self.adam.exp_avg.clone());
+        checkpoint.insert_floats(&name(EXP_AVG_SQ), self.adam.exp_avg_sq.clone());
+        checkpoint.insert_integers(&name(OPTIMIZER_STEPS), vec![self.adam.steps]);
+        checkpoint.insert_doubles(&name(BETA_POWERS), self.adam.beta_powers.to_vec());
     }
 
     /// Restores the state of parameters and optimizer from a checkpoint; on an error nothing
@@ -104,24 +111,38 @@ impl Learner {
     /// [`CheckpointError::Section`] if a section is missing, has another length, or holds values that
     /// no optimizer reaches.
     pub fn load(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
-        let floats =
-            |name: &str| checkpoint.floats(name, self.parameters.len()).map(<[f32]>::to_vec);
+        self.load_as("", checkpoint)
+    }
+
+    /// Restores the state of [`Learner::save_as`]; on an error nothing changes.
+    ///
+    /// # Errors
+    /// As [`Learner::load`].
+    pub fn load_as(
+        &mut self,
+        prefix: &str,
+        checkpoint: &Checkpoint,
+    ) -> Result<(), CheckpointError> {
+        let name = |section: &str| format!("{prefix}{section}");
+        let floats = |section: &str| {
+            checkpoint.floats(&name(section), self.parameters.len()).map(<[f32]>::to_vec)
+        };
         let (parameters, ema_parameters) = (floats(PARAMETERS)?, floats(EMA_PARAMETERS)?);
         let (exp_avg, exp_avg_sq) = (floats(EXP_AVG)?, floats(EXP_AVG_SQ)?);
         if exp_avg_sq.iter().any(|x| *x < 0.0) {
-            return Err(CheckpointError::section(EXP_AVG_SQ, "has a negative value"));
+            return Err(CheckpointError::section(&name(EXP_AVG_SQ), "has a negative value"));
         }
-        let steps = checkpoint.integer(OPTIMIZER_STEPS)?;
+        let steps = checkpoint.integer(&name(OPTIMIZER_STEPS))?;
         if steps > MAX_OPTIMIZER_STEPS {
-            return Err(CheckpointError::section(OPTIMIZER_STEPS, format!("is {steps}")));
+            return Err(CheckpointError::section(&name(OPTIMIZER_STEPS), format!("is {steps}")));
         }
-        let beta_powers: Option<[f64; 2]> = checkpoint.doubles(BETA_POWERS)?.try_into().ok();
+        let beta_powers: Option<[f64; 2]> = checkpoint.doubles(&name(BETA_POWERS))?.try_into().ok();
         let is_reachable = |powers: &[f64; 2]| match steps {
             0 => *powers == [1.0; 2],
             _ => powers.iter().all(|p| (0.0..1.0).contains(p)),
         };
         let Some(beta_powers) = beta_powers.filter(is_reachable) else {
-            return Err(CheckpointError::section(BETA_POWERS, "has impossible values"));
+            return Err(CheckpointError::section(&name(BETA_POWERS), "has impossible values"));
         };
         (self.parameters, self.ema_parameters) = (parameters, ema_parameters);
         self.adam = AdamW { steps, exp_avg, exp_avg_sq, beta_powers };

@@ -4,7 +4,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::instances::Instance;
 use crate::loss::{exp, ln};
 
 /// Number of predictors: 1, log odds of the mean probability, log number of pixels, log distance in
@@ -34,12 +33,13 @@ pub struct CalibrationSample {
     pub is_correct: bool,
 }
 
-/// Returns the predictors of an uncalibrated detection.
-pub fn predictors(instance: &Instance) -> [f32; N_PREDICTORS] {
-    let p = instance.score.clamp(0.01, 0.99);
-    let [x, y, z] = instance.center;
+/// Returns the predictors of a detection with this uncalibrated score, number of pixels, and center
+/// in the camera's frame, meters.
+pub fn predictors(score: f32, n_pixels: usize, center: [f32; 3]) -> [f32; N_PREDICTORS] {
+    let p = score.clamp(0.01, 0.99);
+    let [x, y, z] = center;
     let distance_m = (x * x + y * y + z * z).sqrt().max(0.1);
-    [1.0, ln(p / (1.0 - p)), ln(instance.pixels.len().max(1) as f32), ln(distance_m)]
+    [1.0, ln(p / (1.0 - p)), ln(n_pixels.max(1) as f32), ln(distance_m)]
 }
 
 impl Calibration {

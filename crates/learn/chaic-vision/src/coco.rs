@@ -172,16 +172,20 @@ pub fn annotate(image_id: usize, view: &LabeledView) -> AnnotatedView {
     AnnotatedView { image, annotations: visible.map(annotation).collect() }
 }
 
-/// Converts detections in a view to COCO results.
+/// Converts detections in a view to COCO results, one per name of an instance.
 pub fn results(image_id: usize, view: &LabeledView, found: &[Instance]) -> Vec<CocoResult> {
     let size = [view.camera.width, view.camera.height];
-    let result = |instance: &Instance| CocoResult {
-        image_id,
-        category_id: instance.label,
-        segmentation: RleMask::from_pixels(&instance.pixels, size),
-        score: instance.score,
+    let results_of = |instance: &Instance| {
+        let segmentation = RleMask::from_pixels(&instance.pixels, size);
+        let result = |&(category_id, score): &(u8, f32)| CocoResult {
+            image_id,
+            category_id,
+            segmentation: segmentation.clone(),
+            score,
+        };
+        instance.names.iter().map(result).collect::<Vec<CocoResult>>()
     };
-    found.iter().map(result).collect()
+    found.iter().flat_map(results_of).collect()
 }
 
 /// COCO annotations file.

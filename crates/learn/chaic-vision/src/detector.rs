@@ -101,7 +101,8 @@ impl Detector {
                 let coarser = net.upsample(coarser);
                 level_features = net.add(level_features, coarser);
             }
-            decoded = Some(decoder_block(&mut net, &format!("{name}.block"), level_features));
+            decoded =
+                Some(decoder_block(&mut net, &format!("{name}.block"), level_features, WIDTH));
         }
         let last = net.norm_relu("last.norm", decoded.expect("there are levels"));
         let head = net.output_head("head", last, n_labels() + N_OFFSETS);
@@ -110,7 +111,12 @@ impl Detector {
 }
 
 /// Inverted bottleneck with a residual connection (Liu et al. 2022).
-fn inverted_bottleneck(net: &mut Network, name: &str, from: Node, channels: usize) -> Node {
+pub(crate) fn inverted_bottleneck(
+    net: &mut Network,
+    name: &str,
+    from: Node,
+    channels: usize,
+) -> Node {
     let spatial = net.depthwise(&format!("{name}.depthwise"), from, 5);
     let spatial = net.norm(&format!("{name}.norm"), spatial);
     let wide = net.conv(&format!("{name}.wide"), spatial, Kernel::POINTWISE, EXPANSION * channels);
@@ -127,9 +133,9 @@ fn dense_block(net: &mut Network, name: &str, from: Node, channels: usize) -> No
 }
 
 /// Cheaper block for the decoder at high resolution: the inner width equals the outer width.
-fn decoder_block(net: &mut Network, name: &str, from: Node) -> Node {
+pub(crate) fn decoder_block(net: &mut Network, name: &str, from: Node, channels: usize) -> Node {
     let spatial = net.depthwise(&format!("{name}.depthwise"), from, 3);
     let spatial = net.norm_relu(&format!("{name}.norm"), spatial);
-    let mixed = net.conv(&format!("{name}.mixed"), spatial, Kernel::POINTWISE, WIDTH);
+    let mixed = net.conv(&format!("{name}.mixed"), spatial, Kernel::POINTWISE, channels);
     net.add(from, mixed)
 }

@@ -22,7 +22,8 @@ use crate::views::{DatasetSplit, LabeledView, SyntheticViews, ViewConfig};
 pub const MIN_AREA_PX: u32 = 100;
 const EVALUATED_AREAS: AreaRange = MIN_AREA_PX..=u32::MAX;
 
-/// Computes the overlaps between the instances of a view and the detections.
+/// Computes the overlaps between the instances of a view and the detections, with one detection per
+/// name of an instance.
 pub fn compare(view: &LabeledView, detections: &[Instance]) -> EvaluatedImage {
     let mut areas = vec![0u32; view.labels.len()];
     for id in &view.ids {
@@ -35,7 +36,7 @@ pub fn compare(view: &LabeledView, detections: &[Instance]) -> EvaluatedImage {
     let mut index = vec![usize::MAX; areas.len()];
     visible.iter().enumerate().for_each(|(k, id)| index[*id] = k);
     let truth = |id: &usize| GroundTruthInstance { label: view.labels[*id], area: areas[*id] };
-    let detection = |instance: &Instance| {
+    let detections_of = |instance: &Instance| {
         let mut intersections = vec![0; visible.len()];
         for k in &instance.pixels {
             let id = usize::from(view.ids[*k as usize]);
@@ -44,11 +45,17 @@ pub fn compare(view: &LabeledView, detections: &[Instance]) -> EvaluatedImage {
             }
         }
         let area = instance.pixels.len() as u32;
-        ScoredDetection { label: instance.label, score: instance.score, area, intersections }
+        let detection = |&(label, score): &(u8, f32)| ScoredDetection {
+            label,
+            score,
+            area,
+            intersections: intersections.clone(),
+        };
+        instance.names.iter().map(detection).collect::<Vec<ScoredDetection>>()
     };
     EvaluatedImage {
         truths: visible.iter().map(truth).collect(),
-        detections: detections.iter().map(detection).collect(),
+        detections: detections.iter().flat_map(detections_of).collect(),
     }
 }
 
@@ -94,13 +101,12 @@ fn calibration_samples(detections: &[Instance], image: &EvaluatedImage) -> Vec<C
             truth.label == detection.label && 3 * intersection >= truth.area + detection.area
         })
     };
-    let detections = detections.iter().zip(&image.detections);
-    detections
-        .map(|(instance, detection)| CalibrationSample {
-            predictors: predictors(instance),
-            is_correct: is_correct(detection),
-        })
-        .collect()
+    let named = detections.iter().flat_map(|d| d.names.iter().map(move |name| (d, name)));
+    let samples = named.zip(&image.detections).map(|((instance, (_, score)), detection)| {
+        let predictors = predictors(*score, instance.pixels.len(), instance.center);
+        CalibrationSample { predictors, is_correct: is_correct(detection) }
+    });
+    samples.collect()
 }
 
 /// Maps the first views and their detections to values, in order, on any number of threads; returns
@@ -179,7 +185,8 @@ pub fn report<A: Send>(
     let evaluate_view = |k: usize, view: &LabeledView, detections: &[Instance]| {
         let image = compare(view, detections);
         let correct = calibration_samples(detections, &image).into_iter().map(|s| s.is_correct);
-        let scored: Vec<(f32, bool)> = detections.iter().map(|f| f.score).zip(correct).collect();
+        let scores = image.detections.iter().map(|detection| detection.score);
+        let scored: Vec<(f32, bool)> = scores.zip(correct).collect();
         (image, (scored, map_view(k, view, detections)))
     };
     let never = AtomicBool::new(false);

@@ -20,6 +20,9 @@ pub struct Instance {
     /// Center of the visible part in the camera's frame (x right, y up, z towards the camera),
     /// meters.
     pub center: [f32; 3],
+    /// Labels that the object may have, with their scores, in descending order; the first is
+    /// [`Instance::label`].
+    pub names: Vec<(u8, f32)>,
 }
 
 /// Thresholds of the grouping. "Half extents" are those of the label's class.
@@ -40,18 +43,27 @@ pub struct InstanceConfig {
     pub relabel_extents: f32,
     /// Minimum number of pixels of an instance at the network's resolution.
     pub min_pixels: usize,
+    /// Neighboring pixels of different labels are connected as well. The label with the largest sum
+    /// of probabilities is that of the instance.
+    pub ignores_labels: bool,
+}
+
+impl InstanceConfig {
+    /// Grouping of the one-stage detector.
+    pub const DEFAULT: InstanceConfig = InstanceConfig {
+        gap_m: 0.05,
+        gap_extents: 0.5,
+        center_vote_radius: 0.8,
+        join_extents: 1.0,
+        relabel_extents: 0.7,
+        min_pixels: 5,
+        ignores_labels: false,
+    };
 }
 
 impl Default for InstanceConfig {
     fn default() -> InstanceConfig {
-        InstanceConfig {
-            gap_m: 0.05,
-            gap_extents: 0.5,
-            center_vote_radius: 0.8,
-            join_extents: 1.0,
-            relabel_extents: 0.7,
-            min_pixels: 5,
-        }
+        InstanceConfig::DEFAULT
     }
 }
 
@@ -79,13 +91,26 @@ fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
 
 /// Prediction for one pixel.
 #[derive(Clone, Copy, Debug)]
-struct Pixel {
-    label: u8,
+pub(crate) struct Pixel {
+    pub label: u8,
     /// Probability of the label, 0 to 1.
-    probability: f32,
-    point: [f32; 3],
+    pub probability: f32,
+    pub point: [f32; 3],
     /// Predicted center of the object.
-    vote: [f32; 3],
+    pub vote: [f32; 3],
+}
+
+/// Group of pixels at the network's resolution.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Segment {
+    /// Its label, never the background.
+    pub label: u8,
+    /// Mean probability of its pixels' labels, 0 to 1.
+    pub score: f32,
+    /// Row-major indices of its pixels at the network's resolution.
+    pub pixels: Vec<u32>,
+    /// Median of the predicted centers, in the camera's frame, meters.
+    pub center: [f32; 3],
 }
 
 /// Groups the head's output for a whole image into instances, in descending order of score. Depth
@@ -124,9 +149,28 @@ impl Pixels {
     /// # Panics
     /// If the shapes do not fit, or rows are missing or out of order.
     pub fn read(&mut self, first_row: usize, head: &[f32], depth_m: &[f32]) {
-        let columns = self.camera.width as usize / STRIDE;
-        assert_eq!(self.pixels.len(), first_row * columns, "rows come from top to bottom");
+        assert_eq!(self.pixels.len(), first_row * self.columns(), "rows come from top to bottom");
         decode(head, &mut self.pixels, depth_m, &self.camera, &self.half_extents);
+    }
+
+    /// Returns the camera.
+    pub(crate) fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// Returns the number of columns at the network's resolution.
+    pub(crate) fn columns(&self) -> usize {
+        self.camera.width as usize / STRIDE
+    }
+
+    /// Returns the predictions in row-major order.
+    pub(crate) fn pixels(&self) -> &[Pixel] {
+        &self.pixels
+    }
+
+    /// Returns half the largest extent of each label's class, meters.
+    pub(crate) fn half_extents_m(&self) -> &[f32] {
+        &self.half_extents
     }
 
     /// Groups the pixels into instances, in descending order of score.
@@ -134,86 +178,130 @@ impl Pixels {
     /// # Panics
     /// If the shapes do not fit.
     pub fn instances(&self, depth_m: &[f32], config: &InstanceConfig) -> Vec<Instance> {
-        group(&self.pixels, &self.half_extents, depth_m, &self.camera, config)
+        let segments = self.segments(config);
+        let masks = self.masks(&segments, depth_m);
+        let mut found: Vec<Instance> = segments
+            .iter()
+            .zip(masks)
+            .filter(|(_, mask)| !mask.is_empty())
+            .map(|(segment, pixels)| {
+                let Segment { label, score, center, .. } = *segment;
+                Instance { label, score, pixels, center, names: vec![(label, score)] }
+            })
+            .collect();
+        found.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.pixels[0].cmp(&b.pixels[0])));
+        found
+    }
+
+    /// Groups the pixels into segments, in descending order of size.
+    pub fn segments(&self, config: &InstanceConfig) -> Vec<Segment> {
+        let (pixels, half_extents, columns) = (&self.pixels, &self.half_extents, self.columns());
+        let mut parents: Vec<u32> = (0..pixels.len() as u32).collect();
+        let is_connected = |a: &Pixel, b: &Pixel| {
+            if a.label == BACKGROUND || b.label == BACKGROUND {
+                return false;
+            }
+            let half = half_extents[usize::from(a.label)].min(half_extents[usize::from(b.label)]);
+            (a.label == b.label || config.ignores_labels)
+                && distance(a.point, b.point) < config.gap_m.max(config.gap_extents * half)
+                && distance(a.vote, b.vote) < config.center_vote_radius * half
+        };
+        for k in 0..pixels.len() {
+            if k % columns > 0 && is_connected(&pixels[k], &pixels[k - 1]) {
+                union(&mut parents, k, k - 1);
+            }
+            if k >= columns && is_connected(&pixels[k], &pixels[k - columns]) {
+                union(&mut parents, k, k - columns);
+            }
+        }
+        let mut parts: Vec<Vec<u32>> = Vec::new();
+        let mut part_of = vec![usize::MAX; pixels.len()];
+        for k in (0..pixels.len()).filter(|k| pixels[*k].label != BACKGROUND) {
+            let first = find_root(&mut parents, k);
+            if first == k {
+                part_of[k] = parts.len();
+                parts.push(Vec::new());
+            }
+            part_of[k] = part_of[first];
+            parts[part_of[k]].push(k as u32);
+        }
+        // The largest part comes first and determines the label; smaller ones join it.
+        parts.sort_by_key(|part| (std::cmp::Reverse(part.len()), part[0]));
+        let mut segments: Vec<Segment> = Vec::new();
+        for part in parts {
+            let label = if config.ignores_labels {
+                majority_label(pixels, &part)
+            } else {
+                pixels[part[0] as usize].label
+            };
+            let center = median_vote(pixels, &part);
+            let max_distance_m = config.join_extents * half_extents[usize::from(label)];
+            let is_same_object = |other: u8, distance_m: f32| match other == label {
+                true => distance_m < max_distance_m,
+                false => {
+                    let half =
+                        half_extents[usize::from(other)].min(half_extents[usize::from(label)]);
+                    distance_m < config.relabel_extents * half
+                }
+            };
+            let existing =
+                segments.iter_mut().find(|s| is_same_object(s.label, distance(s.center, center)));
+            match existing {
+                Some(segment) => segment.pixels.extend(part),
+                None => segments.push(Segment { label, score: 0.0, pixels: part, center }),
+            }
+        }
+        segments.retain(|segment| segment.pixels.len() >= config.min_pixels);
+        for segment in &mut segments {
+            let probability = |k: &u32| pixels[*k as usize].probability;
+            let sum: f32 = segment.pixels.iter().map(probability).sum();
+            segment.score = sum / segment.pixels.len() as f32;
+        }
+        segments
+    }
+
+    /// Returns masks of disjoint segments at full resolution, as row-major indices in ascending
+    /// order. Each pixel belongs to the segment of the network pixel with the most similar depth
+    /// among the four nearest. Of segments that overlap, the later one gets the pixel.
+    pub fn masks(&self, segments: &[Segment], depth_m: &[f32]) -> Vec<Vec<u32>> {
+        let (pixels, columns) = (&self.pixels, self.columns());
+        let (width, rows) = (self.camera.width as usize, pixels.len() / columns);
+        let mut segment_of = vec![u16::MAX; pixels.len()];
+        for (n, segment) in segments.iter().enumerate() {
+            segment.pixels.iter().for_each(|k| segment_of[*k as usize] = n as u16);
+        }
+        let mut masks = vec![Vec::new(); segments.len()];
+        for (k, depth) in depth_m.iter().enumerate() {
+            let (x, y) = (k % width, k / width);
+            let (i, j) = (x / STRIDE, y / STRIDE);
+            let (right, below) =
+                ((x.div_ceil(STRIDE)).min(columns - 1), (y.div_ceil(STRIDE)).min(rows - 1));
+            let neighbors = [(i, j), (right, j), (i, below), (right, below)];
+            let depth_error =
+                |(i, j): (usize, usize)| (depth + pixels[j * columns + i].point[2]).abs();
+            let first = neighbors[0];
+            let best = neighbors
+                .into_iter()
+                .fold(first, |a, b| if depth_error(b) < depth_error(a) { b } else { a });
+            let segment = segment_of[best.1 * columns + best.0];
+            if let Some(mask) = masks.get_mut(usize::from(segment)) {
+                mask.push(k as u32);
+            }
+        }
+        masks
     }
 }
 
-fn group(
-    pixels: &[Pixel],
-    half_extents: &[f32],
-    depth_m: &[f32],
-    camera: &Camera,
-    config: &InstanceConfig,
-) -> Vec<Instance> {
-    let (width, columns) = (camera.width as usize, camera.width as usize / STRIDE);
-    let mut parents: Vec<u32> = (0..pixels.len() as u32).collect();
-    let is_connected = |a: &Pixel, b: &Pixel| {
-        let half = half_extents[usize::from(a.label)];
-        a.label == b.label
-            && a.label != BACKGROUND
-            && distance(a.point, b.point) < config.gap_m.max(config.gap_extents * half)
-            && distance(a.vote, b.vote) < config.center_vote_radius * half
-    };
-    for k in 0..pixels.len() {
-        if k % columns > 0 && is_connected(&pixels[k], &pixels[k - 1]) {
-            union(&mut parents, k, k - 1);
-        }
-        if k >= columns && is_connected(&pixels[k], &pixels[k - columns]) {
-            union(&mut parents, k, k - columns);
-        }
+/// Returns the label with the largest sum of probabilities; the lowest one wins ties.
+fn majority_label(pixels: &[Pixel], part: &[u32]) -> u8 {
+    let mut sums = [0.0f32; 256];
+    for k in part {
+        let Pixel { label, probability, .. } = pixels[*k as usize];
+        sums[usize::from(label)] += probability;
     }
-    let mut segments: Vec<Vec<usize>> = Vec::new();
-    let mut segment_of = vec![usize::MAX; pixels.len()];
-    for k in (0..pixels.len()).filter(|k| pixels[*k].label != BACKGROUND) {
-        let first = find_root(&mut parents, k);
-        if first == k {
-            segment_of[k] = segments.len();
-            segments.push(Vec::new());
-        }
-        segment_of[k] = segment_of[first];
-        segments[segment_of[k]].push(k);
-    }
-    // The largest segment comes first and determines the label; smaller ones join it.
-    segments.sort_by_key(|segment| (std::cmp::Reverse(segment.len()), segment[0]));
-    let mut objects: Vec<(u8, [f32; 3], Vec<usize>)> = Vec::new();
-    for segment in segments {
-        let label = pixels[segment[0]].label;
-        let center = median_vote(pixels, &segment);
-        let max_distance_m = config.join_extents * half_extents[usize::from(label)];
-        let is_same_object = |other: u8, distance_m: f32| match other == label {
-            true => distance_m < max_distance_m,
-            false => {
-                let half = half_extents[usize::from(other)].min(half_extents[usize::from(label)]);
-                distance_m < config.relabel_extents * half
-            }
-        };
-        let existing =
-            objects.iter_mut().find(|object| is_same_object(object.0, distance(object.1, center)));
-        match existing {
-            Some(object) => object.2.extend(segment),
-            None => objects.push((label, center, segment)),
-        }
-    }
-    objects.retain(|object| object.2.len() >= config.min_pixels);
-    let mut instance_of = vec![u16::MAX; pixels.len()];
-    for (n, (_, _, segment)) in objects.iter().enumerate() {
-        segment.iter().for_each(|k| instance_of[*k] = n as u16);
-    }
-    let masks = full_resolution_masks(&instance_of, pixels, columns, depth_m, width, objects.len());
-    let mut found: Vec<Instance> = objects
-        .iter()
-        .zip(masks)
-        .filter(|(_, mask)| !mask.is_empty())
-        .map(|((label, center, segment), mask)| Instance {
-            label: *label,
-            score: segment.iter().map(|k| pixels[*k].probability).sum::<f32>()
-                / segment.len() as f32,
-            pixels: mask,
-            center: *center,
-        })
-        .collect();
-    found.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.pixels[0].cmp(&b.pixels[0])));
-    found
+    let best = (1..=u8::MAX)
+        .max_by(|a, b| sums[usize::from(*a)].total_cmp(&sums[usize::from(*b)]).then(b.cmp(a)));
+    best.expect("there are labels")
 }
 
 fn decode(
@@ -302,41 +390,10 @@ impl pulp::NullaryFnOnce for ArgmaxSoftmax<'_> {
     }
 }
 
-fn median_vote(pixels: &[Pixel], segment: &[usize]) -> [f32; 3] {
+fn median_vote(pixels: &[Pixel], part: &[u32]) -> [f32; 3] {
     std::array::from_fn(|axis| {
-        let mut votes: Vec<f32> = segment.iter().map(|k| pixels[*k].vote[axis]).collect();
+        let mut votes: Vec<f32> = part.iter().map(|k| pixels[*k as usize].vote[axis]).collect();
         let median = votes.len() / 2;
         *votes.select_nth_unstable_by(median, f32::total_cmp).1
     })
-}
-
-/// Returns masks at full resolution. Each pixel belongs to the instance of the network pixel with
-/// the most similar depth among the four nearest.
-fn full_resolution_masks(
-    instance_of: &[u16],
-    pixels: &[Pixel],
-    columns: usize,
-    depth_m: &[f32],
-    width: usize,
-    n_instances: usize,
-) -> Vec<Vec<u32>> {
-    let rows = pixels.len() / columns;
-    let mut masks = vec![Vec::new(); n_instances];
-    for (k, depth) in depth_m.iter().enumerate() {
-        let (x, y) = (k % width, k / width);
-        let (i, j) = (x / STRIDE, y / STRIDE);
-        let (right, below) =
-            ((x.div_ceil(STRIDE)).min(columns - 1), (y.div_ceil(STRIDE)).min(rows - 1));
-        let neighbors = [(i, j), (right, j), (i, below), (right, below)];
-        let depth_error = |(i, j): (usize, usize)| (depth + pixels[j * columns + i].point[2]).abs();
-        let first = neighbors[0];
-        let best = neighbors
-            .into_iter()
-            .fold(first, |a, b| if depth_error(b) < depth_error(a) { b } else { a });
-        let instance_of = instance_of[best.1 * columns + best.0];
-        if let Some(mask) = masks.get_mut(usize::from(instance_of)) {
-            mask.push(k as u32);
-        }
-    }
-    masks
 }

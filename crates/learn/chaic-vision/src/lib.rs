@@ -4,8 +4,11 @@
 //! **What it is**, in reading order:
 //! - Data: [`labels`] (classes of pixels), [`features`] (network input), [`views`] (random labeled
 //!   views of generated episodes), [`coco`] (export of views as COCO data sets).
-//! - Detector: [`detector`] (network), [`loss`], [`train`] (training loop), [`instances`] (grouping
-//!   of pixels), [`calibration`] (scores), [`trained`] (weights file).
+//! - Detector, first stage: [`detector`] (network), [`loss`], [`instances`] (grouping of pixels),
+//!   [`proposals`] (several groupings).
+//! - Detector, second stage: [`roi`] (input), [`roi_network`], [`roi_loss`], [`second_stage`]
+//!   (inference).
+//! - Both stages: [`train`] (training loop), [`calibration`] (scores), [`trained`] (weights file).
 //! - Evaluation: [`average_precision`], [`error_breakdown`] (errors by cause), [`evaluate`].
 //! - Perception for agents: [`tracker`], [`perception`] (detector and tracker), [`noisy`] (ground
 //!   truth with simulated errors), [`behavior`] (action recognition), [`perception_registry`] (all
@@ -29,6 +32,12 @@ pub mod detector;
 pub mod loss;
 
 pub mod instances;
+pub mod proposals;
+
+pub mod roi;
+pub mod roi_loss;
+pub mod roi_network;
+pub mod second_stage;
 
 pub mod calibration;
 pub mod trained;
@@ -38,6 +47,7 @@ pub mod coco;
 pub mod error_breakdown;
 pub mod evaluate;
 
+mod roi_train;
 pub mod train;
 
 pub mod noisy;

@@ -8,11 +8,10 @@ use chaic_agents::track::{Hands, Intent, TrackId};
 use chaic_core::geom::Camera;
 use chaic_core::observation::{Grants, SensorConfig};
 use chaic_core::{Briefing, Observation, Outcome, Target};
-use chaic_nn::Inference;
 
 use crate::instances::Instance;
 use crate::tracker::{Measurement, Tracker, TrackerConfig};
-use crate::trained::TrainedDetector;
+use crate::trained::{DetectorInference, TrainedDetector};
 
 /// Creates perception with a trained detector.
 #[derive(Clone, Debug)]
@@ -57,7 +56,7 @@ impl PerceptionFactory for LearnedPerceptionFactory {
 #[derive(Clone, Debug)]
 struct LearnedPerception {
     detector: Arc<TrainedDetector>,
-    inference: Inference,
+    inference: DetectorInference,
     tracking: Tracking,
 }
 

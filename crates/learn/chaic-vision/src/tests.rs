@@ -1,21 +1,28 @@
 //! Promises: features of a wall and a floor agree with geometry, gradients of the loss with finite
 //! differences; views and training repeat bit for bit; training reduces the loss.
 
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use chaic_core::geom::{Camera, yaw_rotation};
 use chaic_core::rng::RngStream;
 use chaic_core::{EntityId, Vec3};
-use chaic_nn::{Shape, Tensor};
+use chaic_nn::simd::widest;
+use chaic_nn::{Pass, Shape, Tensor};
 
 use crate::average_precision::average_precision;
 use crate::detector::{Detector, N_OFFSETS, STRIDE};
 use crate::evaluate::{MIN_AREA_PX, compare, report};
 use crate::features::{ImageCrop, N_FEATURES, features};
-use crate::instances::{InstanceConfig, instances};
+use crate::instances::{InstanceConfig, Pixels, instances};
 use crate::labels::{BACKGROUND, class_of, label_of, n_labels};
 use crate::loss::{LossConfig, Targets, loss};
-use crate::train::{CropConfig, DetectorLearner, DetectorTrainingConfig};
+use crate::proposals::proposals;
+use crate::roi::{RoiBox, SIDE};
+use crate::roi_loss::{RoiTarget, ViewTruth, roi_loss};
+use crate::roi_network::RoiNetwork;
+use crate::roi_train::RoiTrainingConfig;
+use crate::train::{CropConfig, DetectorLearner, DetectorLoss, DetectorTrainingConfig};
 use crate::trained::TrainedDetector;
 use crate::views::{DatasetSplit, LabeledView, SyntheticViews, ViewConfig};
 use chaic_training::conformance::{bounds_every_number, refuses_damaged_checkpoints};
@@ -109,6 +116,7 @@ fn tiny() -> DetectorTrainingConfig {
         uniform_crop_fraction: 0.3,
     };
     DetectorTrainingConfig {
+        second_stage: RoiTrainingConfig { steps: 0, ..RoiTrainingConfig::default() },
         views: ViewConfig { size_px: 128, ..ViewConfig::TRAINING },
         crops: [crops(1, 96), crops(2, 64)],
         warm_up: 2,
@@ -255,10 +263,134 @@ fn the_shipped_detector_finds_most_objects() {
 #[test]
 fn training_learns() {
     let mut learner = DetectorLearner::new(tiny());
-    let losses: Vec<f64> = (0..30).map(|_| learner.step(&NEVER_STOP).unwrap().labels).collect();
+    let mut label_loss = || match learner.step(&NEVER_STOP) {
+        Some(DetectorLoss::FirstStage(loss)) => loss.labels,
+        other => panic!("{other:?}"),
+    };
+    let losses: Vec<f64> = (0..30).map(|_| label_loss()).collect();
     let mean = |losses: &[f64]| losses.iter().sum::<f64>() / losses.len() as f64;
     let (first, last) = (mean(&losses[..3]), mean(&losses[27..]));
     assert!(last < 0.8 * first, "{first} to {last}");
+}
+
+/// Training of the second stage on the shipped first stage.
+fn second_stage_learner(steps: u64) -> DetectorLearner {
+    let second_stage = RoiTrainingConfig {
+        steps,
+        learning_rate: 3e-3,
+        warm_up: 2,
+        views: 1,
+        proposals_per_view: 12,
+    };
+    let config =
+        DetectorTrainingConfig { steps: 0, second_stage, ..DetectorTrainingConfig::shipped(0) };
+    let mut learner = DetectorLearner::new(config);
+    let shipped = include_bytes!("../weights/detector.safetensors");
+    let parameters = DetectorLearner::read_weights(&config, shipped).unwrap();
+    learner.load_parameters(parameters);
+    learner
+}
+
+#[test]
+fn the_second_stage_learns_on_proposals_of_the_first_and_resumes() {
+    let mut learner = second_stage_learner(12);
+    let mut losses = Vec::new();
+    let mut resumed = second_stage_learner(12);
+    for step in 0..12 {
+        if step == 10 {
+            resumed.resume(&learner.checkpoint(), &NEVER_STOP).unwrap();
+        }
+        match learner.step(&NEVER_STOP) {
+            Some(DetectorLoss::SecondStage(loss)) => losses.push(loss.qualities),
+            other => panic!("{other:?}"),
+        }
+    }
+    (10..12).for_each(|_| assert!(resumed.step(&NEVER_STOP).is_some()));
+    assert!(resumed.checkpoint() == learner.checkpoint());
+    let mean = |losses: &[f64]| losses.iter().sum::<f64>() / losses.len() as f64;
+    let (first, last) = (mean(&losses[..3]), mean(&losses[9..]));
+    assert!(last < 0.75 * first, "{first} to {last}");
+    let bytes = learner.trained().to_bytes().unwrap();
+    let trained = TrainedDetector::from_bytes(&bytes).unwrap();
+    assert!(trained.second_stage.is_some() && trained.to_bytes().as_ref() == Ok(&bytes));
+    let view = SyntheticViews::new(DatasetSplit::Validation, tiny().views, 1, 3).draw();
+    let mut inference = trained.inference();
+    let detections = trained.detect(&view.rgb, &view.depth_m, &view.camera, &mut inference);
+    let mut owned = vec![false; view.ids.len()];
+    for k in detections.iter().flat_map(|d| &d.pixels) {
+        assert!(!std::mem::replace(&mut owned[*k as usize], true), "instances overlap");
+    }
+}
+
+#[test]
+fn second_stage_gradients_match_finite_differences() {
+    let network = RoiNetwork::new();
+    let mut rng = RngStream::new(1, "loss", 0);
+    let n_samples = SIDE * SIDE;
+    let target = |label: u8| RoiTarget {
+        label,
+        mask: (0..n_samples).map(|k| (k % 3) as i8 - 1).collect(),
+        n_outside: 40.0,
+        iou: 0.3,
+    };
+    let targets = [target(4), target(BACKGROUND), target(9)];
+    let mut parameters = network.network.init_parameters(1);
+    let inputs = RoiNetwork::input_shapes(targets.len()).map(|shape| Tensor {
+        shape,
+        data: (0..shape.len()).map(|_| rng.range(-1.0, 1.0)).collect(),
+    });
+    let mut pass = Pass::new(&network.network, widest());
+    let mut loss_and_gradient = |parameters: &[f32]| {
+        let [crops, scalars] = &inputs;
+        pass.forward_all(&network.network, parameters, &[crops, scalars]);
+        pass.zero_gradients();
+        let loss = roi_loss(&network, &targets, &mut pass);
+        let mut gradient = vec![0.0; parameters.len()];
+        pass.backward(&network.network, parameters, &mut gradient);
+        (loss.labels + loss.mask + 0.5 * loss.qualities, gradient)
+    };
+    let (_, gradient) = loss_and_gradient(&parameters);
+    // Biases of the heads change no threshold of the redrawn masks unless a logit is near zero.
+    for name in ["labels.bias", "qualities.bias"] {
+        let range = network.network.parameters().iter().find(|p| p.name == name).unwrap();
+        for k in range.range.clone().step_by(20) {
+            let (h, before) = (1e-2, parameters[k]);
+            let mut at = |value: f32| {
+                parameters[k] = value;
+                loss_and_gradient(&parameters).0
+            };
+            let measured = (at(before + h) - at(before - h)) / (2.0 * f64::from(h));
+            parameters[k] = before;
+            let exact = f64::from(gradient[k]);
+            // The exponential function of the loss is accurate to half a percent.
+            let is_equal = (measured - exact).abs() < 2e-3 + 0.02 * exact.abs();
+            assert!(is_equal, "{name} {k}: {measured} for {exact}");
+        }
+    }
+}
+
+#[test]
+fn proposals_of_a_perfect_first_stage_include_the_true_instances() {
+    let (mut n_found, mut n_true) = (0, 0);
+    for k in 0..4 {
+        let view = SyntheticViews::new(DatasetSplit::Validation, ViewConfig::NATURAL, 7, k).draw();
+        let mut pixels = Pixels::new(&view.camera);
+        pixels.read(0, &perfect_output(&view).data, &view.depth_m);
+        let truth = ViewTruth::new(&view);
+        let proposals = proposals(&pixels);
+        assert!(proposals.iter().all(|p| p.pixels.is_sorted()));
+        let mut best: BTreeMap<u8, f32> = BTreeMap::new();
+        for proposal in &proposals {
+            let roi = RoiBox::around(&proposal.pixels, view.camera.width as usize / STRIDE);
+            let RoiTarget { label, iou, .. } = truth.target(proposal, roi);
+            let best = best.entry(label).or_default();
+            *best = best.max(iou);
+        }
+        best.remove(&BACKGROUND);
+        n_true += best.len();
+        n_found += best.values().filter(|iou| **iou > 0.7).count();
+    }
+    assert!(n_true > 8 && 10 * n_found >= 9 * n_true, "{n_found} of {n_true}");
 }
 
 /// Returns the output of a network without errors.

@@ -1,13 +1,15 @@
-//! The training loop of the detector.
+//! The training loop of the detector: first stage, then second stage.
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Mutex, PoisonError};
 
 use chaic_core::rng::RngStream;
+use chaic_nn::simd::widest;
 use chaic_nn::weights::WeightsError;
-use chaic_nn::{AdamWConfig, Network, Pass, Shape, Tensor};
+use chaic_nn::{AdamWConfig, Inference, Network, Pass, Shape, Tensor};
 use chaic_training::bounds::{
-    ADAM, Bound, BoundTable, FRACTION, LEARNING_RATE, SEED, SHARDS, STEPS, integer, real,
+    ADAM, Bound, BoundTable, FRACTION, LEARNING_RATE, MAX_STEPS, SEED, SHARDS, STEPS, integer, real,
 };
 use chaic_training::{
     Checkpoint, CheckpointError, Learner, Metrics, Trainer, TrainingError, learning_rate_at,
@@ -20,7 +22,11 @@ use crate::evaluate::{calibrate, evaluate};
 use crate::features::{ImageCrop, N_FEATURES, features};
 use crate::labels::BACKGROUND;
 use crate::loss::{Loss, LossConfig, Targets, loss};
-use crate::trained::TrainedDetector;
+use crate::roi_loss::RoiLoss;
+use crate::roi_network::RoiNetwork;
+use crate::roi_train::{ROI_BOUNDS, RoiBatch, RoiTrainingConfig, mean_roi_loss};
+use crate::second_stage::SecondStage;
+use crate::trained::{TrainedDetector, both_stages};
 use crate::views::{DatasetSplit, LabeledView, SyntheticViews, ViewConfig};
 
 /// Crops of a batch.
@@ -46,7 +52,7 @@ pub struct CropConfig {
 pub struct DetectorTrainingConfig {
     /// Seed of weights and views.
     pub seed: u64,
-    /// Number of steps; the learning rate schedule ends there.
+    /// Number of steps of the first stage; its learning rate schedule ends there.
     pub steps: u64,
     /// Maximum learning rate. The rate rises linearly, then falls along a parabola to a hundredth.
     #[serde(alias = "rate")]
@@ -63,6 +69,8 @@ pub struct DetectorTrainingConfig {
     pub views: ViewConfig,
     /// Weights of the loss.
     pub loss: LossConfig,
+    /// Training of the second stage.
+    pub second_stage: RoiTrainingConfig,
     /// Configuration of the optimizer.
     pub adam: AdamWConfig,
 }
@@ -99,6 +107,7 @@ impl DetectorTrainingConfig {
             ],
             views: ViewConfig::TRAINING,
             loss: LossConfig::TRAINING,
+            second_stage: RoiTrainingConfig::default(),
             adam: AdamWConfig::default(),
         }
     }
@@ -202,25 +211,61 @@ fn random_visible_object(
 pub struct DetectorLearner {
     /// Its configuration.
     pub config: DetectorTrainingConfig,
-    /// The network.
+    /// Network of the first stage.
     pub detector: Detector,
-    /// Parameters and optimizer.
+    /// Parameters and optimizer of the first stage.
     pub learner: Learner,
+    /// Network of the second stage.
+    pub roi_network: RoiNetwork,
+    /// Parameters and optimizer of the second stage.
+    pub roi_learner: Learner,
+    /// Parameters of both stages.
+    layout: Network,
+    /// The trained first stage, for each shard of the second.
+    first_stages: Vec<Mutex<Inference>>,
+}
+
+/// Prefix of the second stage's sections in checkpoints.
+const SECOND_STAGE: &str = "roi.";
+
+/// Metrics of a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum DetectorLoss {
+    /// Step of the first stage.
+    FirstStage(Loss),
+    /// Step of the second stage.
+    SecondStage(RoiLoss),
 }
 
 impl DetectorLearner {
     /// Creates the state before the first step.
     pub fn new(config: DetectorTrainingConfig) -> DetectorLearner {
         let detector = Detector::with_blocks(config.blocks);
-        let learner = Learner::new(&detector.network, config.seed, config.shards);
-        DetectorLearner { config, detector, learner }
+        let roi_network = RoiNetwork::new();
+        DetectorLearner {
+            learner: Learner::new(&detector.network, config.seed, config.shards),
+            roi_learner: Learner::new(&roi_network.network, config.seed, config.shards),
+            layout: both_stages(&detector, &roi_network),
+            first_stages: Vec::new(),
+            config,
+            detector,
+            roi_network,
+        }
     }
 
     /// Trains on new views, which depend on the seed and the step only. Returns `None`, without a
     /// step, if `stop` is set meanwhile.
-    pub fn step(&mut self, stop: &AtomicBool) -> Option<Loss> {
+    pub fn step(&mut self, stop: &AtomicBool) -> Option<DetectorLoss> {
+        if self.learner.adam.steps < self.config.steps {
+            self.first_stage_step(stop).map(DetectorLoss::FirstStage)
+        } else {
+            self.second_stage_step(stop).map(DetectorLoss::SecondStage)
+        }
+    }
+
+    fn first_stage_step(&mut self, stop: &AtomicBool) -> Option<Loss> {
         let step = self.learner.adam.steps;
-        let DetectorLearner { config, detector, learner } = self;
+        let DetectorLearner { config, detector, learner, .. } = self;
         let (config, detector) = (&*config, &*detector);
         let shard_gradient =
             |shard: usize, parameters: &[f32], pass: &mut Pass, grad_parameters: &mut [f32]| {
@@ -235,6 +280,43 @@ impl DetectorLearner {
         let losses =
             learner.step(&detector.network, &config.adam, config.rate_at(step), shard_gradient)?;
         Some(mean_loss(&losses))
+    }
+
+    fn second_stage_step(&mut self, stop: &AtomicBool) -> Option<RoiLoss> {
+        let step = self.roi_learner.adam.steps;
+        let DetectorLearner { config, detector, learner, roi_network, roi_learner, .. } = self;
+        if self.first_stages.is_empty() {
+            let first_stage = Inference::new(&detector.network, &learner.ema_parameters, widest());
+            self.first_stages =
+                (0..config.shards).map(|_| Mutex::new(first_stage.clone())).collect();
+        }
+        let (config, network, first_stages) = (&*config, &*roi_network, &self.first_stages);
+        let roi = &config.second_stage;
+        let shard_gradient =
+            |shard: usize, parameters: &[f32], pass: &mut Pass, grad_parameters: &mut [f32]| {
+                let index = step * config.shards as u64 + shard as u64;
+                let seed = config.seed;
+                let mut views = SyntheticViews::new(DatasetSplit::Train, config.views, seed, index);
+                let mut rng = RngStream::new(seed, "proposals", index);
+                let first_stage = first_stages[shard].lock();
+                let first_stage = &mut *first_stage.unwrap_or_else(PoisonError::into_inner);
+                let batch = RoiBatch::draw(roi, &mut views, &mut rng, first_stage, stop)?;
+                Some(batch.gradient(network, parameters, pass, grad_parameters))
+            };
+        let rate = learning_rate_at(step, roi.learning_rate, roi.warm_up, roi.steps);
+        let losses = roi_learner.step(&network.network, &config.adam, rate, shard_gradient)?;
+        Some(mean_roi_loss(&losses))
+    }
+
+    /// Returns the detector with the averaged parameters, without score calibration.
+    pub(crate) fn trained(&self) -> TrainedDetector {
+        let first_stage =
+            TrainedDetector::uncalibrated(&self.detector, &self.learner.ema_parameters);
+        let second_stage = (self.roi_learner.adam.steps > 0).then(|| SecondStage {
+            network: self.roi_network.clone(),
+            parameters: self.roi_learner.ema_parameters.clone(),
+        });
+        TrainedDetector { second_stage, ..first_stage }
     }
 }
 
@@ -304,15 +386,17 @@ impl Trainer for DetectorLearner {
     type Config = DetectorTrainingConfig;
     const KIND: &'static str = "detector";
     const WEIGHTS: &'static str = "detector.safetensors";
+    const VALIDATION_STEPS: u64 = 2000;
     const BOUNDS: BoundTable = &[
         ("seed", SEED),
-        ("steps", STEPS),
+        ("steps", integer(0, MAX_STEPS as i64)),
         ("learning_rate", LEARNING_RATE),
         ("warm_up", STEPS),
         ("shards", SHARDS),
         ("crops", Bound::Table(CROP_BOUNDS)),
         ("views", Bound::Table(VIEW_BOUNDS)),
         ("loss", Bound::Table(LOSS_BOUNDS)),
+        ("second_stage", Bound::Table(ROI_BOUNDS)),
         ("adam", ADAM),
     ];
 
@@ -345,33 +429,38 @@ impl Trainer for DetectorLearner {
         config: &DetectorTrainingConfig,
         weights: &[u8],
     ) -> Result<Vec<f32>, WeightsError> {
-        Ok(TrainedDetector::from_bytes_with_detector(
-            Detector::with_blocks(config.blocks),
-            weights,
-        )?
-        .parameters)
+        let detector = Detector::with_blocks(config.blocks);
+        let trained = TrainedDetector::from_bytes_with_detector(detector, weights)?;
+        let second_stage = match trained.second_stage {
+            Some(stage) => stage.parameters,
+            None => RoiNetwork::new().network.init_parameters(config.seed),
+        };
+        Ok([trained.parameters, second_stage].concat())
     }
 
     fn network(&self) -> &Network {
-        &self.detector.network
+        &self.layout
     }
 
     fn total_steps(&self) -> u64 {
-        self.config.steps
+        self.config.steps + self.config.second_stage.steps
     }
 
     fn steps_done(&self) -> u64 {
-        self.learner.adam.steps
+        self.learner.adam.steps + self.roi_learner.adam.steps
     }
 
     fn checkpoint(&self) -> Checkpoint {
         let mut checkpoint = Checkpoint::default();
         self.learner.save(&mut checkpoint);
+        self.roi_learner.save_as(SECOND_STAGE, &mut checkpoint);
         checkpoint
     }
 
-    fn load_parameters(&mut self, parameters: Vec<f32>) {
+    fn load_parameters(&mut self, mut parameters: Vec<f32>) {
+        let second_stage = parameters.split_off(self.detector.network.n_parameters());
         self.learner.load_parameters(parameters);
+        self.roi_learner.load_parameters(second_stage);
     }
 
     fn resume(
@@ -379,23 +468,42 @@ impl Trainer for DetectorLearner {
         checkpoint: &Checkpoint,
         _: &AtomicBool,
     ) -> Result<Option<()>, CheckpointError> {
-        self.learner.load(checkpoint).map(Some)
+        let before = self.learner.state();
+        self.learner.load(checkpoint)?;
+        if let Err(error) = self.roi_learner.load_as(SECOND_STAGE, checkpoint) {
+            self.learner.set_state(before);
+            return Err(error);
+        }
+        self.first_stages.clear();
+        Ok(Some(()))
     }
 
     fn step(&mut self, stop: &AtomicBool) -> Result<Option<Metrics>, TrainingError> {
         let Some(loss) = DetectorLearner::step(self, stop) else { return Ok(None) };
-        let Loss { labels, offsets, accuracy, object_accuracy } = loss;
-        Ok(Some(metrics([
-            ("label_loss", labels),
-            ("offset_loss", offsets),
-            ("accuracy", accuracy),
-            ("object_accuracy", object_accuracy),
-        ])))
+        Ok(Some(match loss {
+            DetectorLoss::FirstStage(Loss { labels, offsets, accuracy, object_accuracy }) => {
+                metrics([
+                    ("label_loss", labels),
+                    ("offset_loss", offsets),
+                    ("accuracy", accuracy),
+                    ("object_accuracy", object_accuracy),
+                ])
+            }
+            DetectorLoss::SecondStage(RoiLoss { labels, mask, qualities, accuracy, iou }) => {
+                metrics([
+                    ("roi_label_loss", labels),
+                    ("roi_mask_loss", mask),
+                    ("roi_quality_loss", qualities),
+                    ("roi_accuracy", accuracy),
+                    ("proposal_iou", iou[0]),
+                    ("redrawn_iou", iou[1]),
+                ])
+            }
+        }))
     }
 
     fn validate(&self, stop: &AtomicBool) -> Result<Option<(Metrics, Vec<u8>)>, WeightsError> {
-        let ema_parameters = &self.learner.ema_parameters;
-        let mut detector = TrainedDetector::uncalibrated(&self.detector, ema_parameters);
+        let mut detector = self.trained();
         let (views, n_threads) = (self.config.views, self.config.shards);
         let precision = evaluate(&detector, views, VALIDATION_VIEWS, n_threads, stop);
         let natural = ViewConfig { size_px: views.size_px, ..ViewConfig::NATURAL };

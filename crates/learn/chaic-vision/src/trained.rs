@@ -2,45 +2,74 @@
 
 use chaic_core::ClassId;
 use chaic_core::geom::Camera;
-pub use chaic_nn::Inference;
 use chaic_nn::simd::widest;
 use chaic_nn::weights::WeightsError;
-use chaic_nn::{Network, Shape, weights};
+use chaic_nn::{Inference, Network, Pass, Shape, weights};
 
 use crate::calibration::{Calibration, N_PREDICTORS, predictors};
 use crate::detector::Detector;
 use crate::features::{ImageCrop, N_FEATURES, features};
 use crate::instances::{Instance, InstanceConfig, Pixels};
+use crate::proposals::proposals;
+use crate::roi::RoiSource;
+use crate::roi_network::RoiNetwork;
+use crate::second_stage::SecondStage;
 
 /// A trained detector.
 #[derive(Clone, Debug)]
 pub struct TrainedDetector {
-    /// The network.
+    /// Network of the first stage.
     pub detector: Detector,
-    /// Parameters of the network.
+    /// Parameters of the first stage.
     pub parameters: Vec<f32>,
+    /// The second stage; without it, segments of the first stage are instances.
+    pub second_stage: Option<SecondStage>,
     /// Calibration of scores.
     pub calibration: Calibration,
 }
 
-/// Returns the kind in weights files: format version and digest of the classes.
-fn kind() -> String {
+/// Name of the second stage's parameters in weights files.
+const SECOND_STAGE: &str = "roi.";
+
+/// Returns the kind in weights files: format version, number of stages, and digest of the classes.
+fn kind(n_stages: usize) -> String {
     let names: Vec<&str> = ClassId::all().map(|class| class.name()).collect();
-    format!("chaic detector 1, classes {}", weights::digest(names.join(" ").as_bytes()))
+    format!("chaic detector {n_stages}, classes {}", weights::digest(names.join(" ").as_bytes()))
 }
 
-/// Returns the network together with the calibration parameters of the file.
-fn file_layout(detector: &Detector) -> Network {
+/// Returns the parameters of both stages as those of one network.
+pub(crate) fn both_stages(detector: &Detector, second_stage: &RoiNetwork) -> Network {
     let mut network = detector.network.clone();
+    network.append_parameters(SECOND_STAGE, &second_stage.network);
+    network
+}
+
+/// Returns the layout of a file: network parameters and calibration.
+fn file_layout(detector: &Detector, second_stage: Option<&RoiNetwork>) -> Network {
+    let mut network = match second_stage {
+        Some(second_stage) => both_stages(detector, second_stage),
+        None => detector.network.clone(),
+    };
     network.extra_parameters("calibration", N_PREDICTORS);
     network
 }
 
+/// Buffers for inference.
+#[derive(Clone, Debug)]
+pub struct DetectorInference {
+    first_stage: Inference,
+    second_stage: Option<Pass>,
+}
+
 impl TrainedDetector {
-    /// Creates a detector without score calibration.
+    /// Creates a detector of one stage without score calibration.
     pub fn uncalibrated(detector: &Detector, parameters: &[f32]) -> TrainedDetector {
-        let (detector, parameters) = (detector.clone(), parameters.to_vec());
-        TrainedDetector { detector, parameters, calibration: Calibration::default() }
+        TrainedDetector {
+            detector: detector.clone(),
+            parameters: parameters.to_vec(),
+            second_stage: None,
+            calibration: Calibration::default(),
+        }
     }
 
     /// Returns the detector that chaic ships; weights/README.md documents its training and
@@ -50,7 +79,7 @@ impl TrainedDetector {
         TrainedDetector::from_bytes(bytes).expect("a test reads the shipped weights")
     }
 
-    /// Reads a safetensors file.
+    /// Reads a safetensors file of a detector with one or two stages.
     ///
     /// # Errors
     /// [`WeightsError`] if the file is damaged or holds weights of another network.
@@ -66,10 +95,17 @@ impl TrainedDetector {
         detector: Detector,
         bytes: &[u8],
     ) -> Result<TrainedDetector, WeightsError> {
-        let mut parameters = weights::from_bytes(&file_layout(&detector), bytes, &kind())?;
-        let coefficients = parameters.split_off(detector.network.n_parameters());
+        let has_second_stage = weights::kind(bytes)? != kind(1);
+        let network = has_second_stage.then(RoiNetwork::new);
+        let layout = file_layout(&detector, network.as_ref());
+        let n_stages = 1 + usize::from(has_second_stage);
+        let mut parameters = weights::from_bytes(&layout, bytes, &kind(n_stages))?;
+        let coefficients = parameters.split_off(parameters.len() - N_PREDICTORS);
         let coefficients = coefficients.try_into().expect("the layout ends with the calibration");
-        Ok(TrainedDetector { detector, parameters, calibration: Calibration { coefficients } })
+        let others = parameters.split_off(detector.network.n_parameters());
+        let second_stage = network.map(|network| SecondStage { network, parameters: others });
+        let calibration = Calibration { coefficients };
+        Ok(TrainedDetector { detector, parameters, second_stage, calibration })
     }
 
     /// Writes a safetensors file.
@@ -77,21 +113,33 @@ impl TrainedDetector {
     /// # Errors
     /// If a parameter is not finite.
     pub fn to_bytes(&self) -> Result<Vec<u8>, WeightsError> {
-        weights::to_bytes(&file_layout(&self.detector), &self.all_parameters(), &kind())
+        weights::to_bytes(&self.file_layout(), &self.all_parameters(), &self.kind())
+    }
+
+    fn file_layout(&self) -> Network {
+        file_layout(&self.detector, self.second_stage.as_ref().map(|stage| &stage.network))
+    }
+
+    fn kind(&self) -> String {
+        kind(1 + usize::from(self.second_stage.is_some()))
     }
 
     fn all_parameters(&self) -> Vec<f32> {
-        self.parameters.iter().chain(&self.calibration.coefficients).copied().collect()
+        let second_stage = self.second_stage.iter().flat_map(|stage| &stage.parameters);
+        let parameters = self.parameters.iter().chain(second_stage);
+        parameters.chain(&self.calibration.coefficients).copied().collect()
     }
 
     /// Returns the digest of the weights file, twelve hexadecimal digits.
     pub fn digest(&self) -> String {
-        weights::digest_of(&file_layout(&self.detector), &self.all_parameters(), &kind())
+        weights::digest_of(&self.file_layout(), &self.all_parameters(), &self.kind())
     }
 
     /// Creates buffers for inference.
-    pub fn inference(&self) -> Inference {
-        Inference::new(&self.detector.network, &self.parameters, widest())
+    pub fn inference(&self) -> DetectorInference {
+        let first_stage = Inference::new(&self.detector.network, &self.parameters, widest());
+        let second_stage = self.second_stage.as_ref().map(SecondStage::pass);
+        DetectorInference { first_stage, second_stage }
     }
 
     /// Returns whether both sides of the camera's image are multiples of the network's stride.
@@ -110,20 +158,41 @@ impl TrainedDetector {
         rgb: &[u8],
         depth_m: &[f32],
         camera: &Camera,
-        inference: &mut Inference,
+        inference: &mut DetectorInference,
     ) -> Vec<Instance> {
-        let crop = ImageCrop::whole(camera);
-        let [width, height] = crop.size;
-        let shape = Shape { n: 1, height, width, channels: N_FEATURES };
-        features(rgb, depth_m, camera, crop, inference.input(shape));
-        let mut pixels = Pixels::new(camera);
-        let read_rows = |_, row: usize, strip: &[f32]| pixels.read(row, strip, depth_m);
-        inference.run(read_rows);
-        let mut instances = pixels.instances(depth_m, &InstanceConfig::default());
+        let DetectorInference { first_stage, second_stage } = inference;
+        let pixels = first_stage_pixels(rgb, depth_m, camera, first_stage);
+        let mut instances = match (&self.second_stage, second_stage) {
+            (Some(stage), Some(pass)) => {
+                let source = RoiSource { features: first_stage.last_input(), pixels: &pixels };
+                stage.instances(&source, &proposals(&pixels), depth_m, pass)
+            }
+            _ => pixels.instances(depth_m, &InstanceConfig::DEFAULT),
+        };
         for instance in &mut instances {
-            instance.score = self.calibration.probability(&predictors(instance));
+            for (_, score) in &mut instance.names {
+                let predictors = predictors(*score, instance.pixels.len(), instance.center);
+                *score = self.calibration.probability(&predictors);
+            }
+            instance.score = instance.names[0].1;
         }
         instances.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.pixels[0].cmp(&b.pixels[0])));
         instances
     }
+}
+
+/// Runs the first stage on an image.
+pub(crate) fn first_stage_pixels(
+    rgb: &[u8],
+    depth_m: &[f32],
+    camera: &Camera,
+    inference: &mut Inference,
+) -> Pixels {
+    let crop = ImageCrop::whole(camera);
+    let [width, height] = crop.size;
+    let shape = Shape { n: 1, height, width, channels: N_FEATURES };
+    features(rgb, depth_m, camera, crop, inference.input(shape));
+    let mut pixels = Pixels::new(camera);
+    inference.run(|_, row: usize, strip: &[f32]| pixels.read(row, strip, depth_m));
+    pixels
 }

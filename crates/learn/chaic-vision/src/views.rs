@@ -165,6 +165,8 @@ struct ViewScene {
     world: World,
     scene: Scene,
     labels: Vec<u8>,
+    /// Instance id of each entity; panels of one structure have the same.
+    instance_ids: Vec<u16>,
     postures: Vec<Posture>,
     /// Label that views aim at.
     wanted: Option<u8>,
@@ -227,10 +229,11 @@ impl SyntheticViews {
             false => Appearance::Canonical,
         };
         let scene = Scene::with_appearance(world.setup(), appearance);
-        let labels = world.classes().into_iter().map(label_of).collect();
+        let labels: Vec<u8> = world.classes().into_iter().map(label_of).collect();
         let postures = world.setup().agents().map(|agent| world.posture(agent)).collect();
         let wanted = wanted.map(|class| label_of(Some(class)));
-        Some(ViewScene { world, scene, labels, postures, wanted })
+        let instance_ids = instance_ids(world.setup(), labels.len());
+        Some(ViewScene { world, scene, labels, instance_ids, postures, wanted })
     }
 
     /// Returns the setup with replaced small objects, obstacles and furniture, and with additional
@@ -368,7 +371,7 @@ impl SyntheticViews {
         };
         let view = View::from_camera(camera, Channels::ALL);
         let images = scene.scene.render_state(&state, &scene.postures, &[view]).pop()?;
-        let (rgb, depth_m, ids) = (images.rgb?, images.depth_m?, images.ids?);
+        let (rgb, depth_m, mut ids) = (images.rgb?, images.depth_m?, images.ids?);
         let n_near = depth_m.iter().filter(|d| **d < NEAR_M).count();
         let n_aimed = aimed_at.map(|e| ids.iter().filter(|id| **id == e.0).count());
         if n_near as f32 > MAX_NEAR_FRACTION * depth_m.len() as f32
@@ -376,6 +379,10 @@ impl SyntheticViews {
         {
             return None;
         }
+        for id in &mut ids {
+            *id = scene.instance_ids.get(usize::from(*id)).copied().unwrap_or(*id);
+        }
+        let aimed_at = aimed_at.map(|e| EntityId(scene.instance_ids[usize::from(e.0)]));
         Some(LabeledView { camera, rgb, depth_m, ids, labels: scene.labels.clone(), aimed_at })
     }
 
@@ -467,6 +474,34 @@ impl SyntheticViews {
             }
         }
     }
+}
+
+/// Classes whose objects are panels of a longer structure.
+const PANELS: [&str; 1] = ["fence"];
+/// Maximum gap between panels of one structure, meters.
+const MAX_PANEL_GAP_M: f32 = 0.1;
+
+/// Returns the instance id of each entity: that of its first panel for the panels of a structure,
+/// and its own for other entities.
+fn instance_ids(setup: &Setup, n_entities: usize) -> Vec<u16> {
+    let mut ids: Vec<u16> = (0..n_entities as u16).collect();
+    let is_panel = |object: &&(usize, &ObjectSpec)| PANELS.contains(&object.1.class.name());
+    let objects: Vec<(usize, &ObjectSpec)> = setup.things.iter().enumerate().collect();
+    let panels: Vec<&(usize, &ObjectSpec)> = objects.iter().filter(is_panel).collect();
+    let id_of = |k: usize| k + usize::from(EntityId::FIRST_OBJECT.0);
+    for (n, (k, panel)) in panels.iter().enumerate() {
+        for (other, other_panel) in &panels[..n] {
+            let reach_m = panel.size_m().x.max(panel.size_m().z) + MAX_PANEL_GAP_M;
+            let is_adjacent = panel.class == other_panel.class
+                && panel.position.distance(other_panel.position) < reach_m;
+            let (from, to) = (ids[id_of(*k)], ids[id_of(*other)]);
+            if is_adjacent && from != to {
+                let (low, high) = (from.min(to), from.max(to));
+                ids.iter_mut().filter(|id| **id == high).for_each(|id| *id = low);
+            }
+        }
+    }
+    ids
 }
 
 /// Height of the observer, meters.

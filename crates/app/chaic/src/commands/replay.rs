@@ -10,7 +10,7 @@ use chaic_eval::replay::{self, Masks, ReplayOptions};
 use chaic_eval::run::RunOptions;
 use chaic_vision::error_breakdown::REPORT_SCORE;
 use chaic_vision::perception_registry::{read_detector, weights_of};
-use chaic_vision::trained::{Inference, TrainedDetector};
+use chaic_vision::trained::{DetectorInference, TrainedDetector};
 use serde_json::json;
 
 use super::bars;
@@ -70,7 +70,7 @@ fn detector_of(options: &RunOptions) -> Result<TrainedDetector> {
 /// A detector that finds masks in views.
 struct DetectedMasks {
     detector: TrainedDetector,
-    inference: Inference,
+    inference: DetectorInference,
 }
 
 impl DetectedMasks {

@@ -165,10 +165,12 @@ fn readable_names(names: &[String]) -> String {
 }
 
 /// Titles of helpers that other crates register.
-const EXTERNAL_TITLES: [(&str, &str); 7] = [
+const EXTERNAL_TITLES: [(&str, &str); 9] = [
     (NONE, "w/o"),
     ("cloned", "Cloned"),
+    ("rl", "RL"),
     ("rl_paper", "RL, paper's recipe"),
+    ("smart_help", "Smart-Help"),
     // Without "BM": our behavior models do not detect failures, unlike the paper's.
     ("llm", "LLM"),
     ("llm-told", "LLM, told"),

@@ -18,8 +18,9 @@ use chaic_learn::actor_critic::ActorCritic as _;
 use chaic_learn::bundled::BundledHelper;
 use chaic_learn::helpers::{NamedPolicy, PolicyRegistry};
 use chaic_learn::opponent::network::OpponentInput;
+use chaic_learn::opponent::train::OpponentTrainer;
 use chaic_learn::primitive::network::PrimitiveNetwork;
-use chaic_learn::train::{CloningConfig, PolicyTrainer};
+use chaic_learn::train::{CloningConfig, PolicyTrainer, PpoTrainingConfig};
 use chaic_nn::weights;
 use chaic_training::parse_config;
 
@@ -76,8 +77,15 @@ fn bundled_helpers_have_weights_with_a_digest() {
 
 #[test]
 fn the_recipes_of_bundled_weights_are_valid() {
-    let recipe = include_str!("../../weights/cloned.toml");
-    assert!(parse_config::<PolicyTrainer<CloningConfig>>(recipe).is_ok());
+    for recipe in
+        [include_str!("../../weights/cloned.toml"), include_str!("../../weights/rl_clone.toml")]
+    {
+        assert!(parse_config::<PolicyTrainer<CloningConfig>>(recipe).is_ok());
+    }
+    let recipe = include_str!("../../weights/rl.toml");
+    assert!(parse_config::<PolicyTrainer<PpoTrainingConfig>>(recipe).is_ok());
+    let recipe = include_str!("../../weights/smart_help_opponent.toml");
+    assert!(parse_config::<OpponentTrainer>(recipe).is_ok());
 }
 
 #[test]

@@ -1,0 +1,301 @@
+//! Second stage of the detector: names, redraws and scores proposals, and suppresses those that show
+//! the same object.
+
+use chaic_nn::simd::widest;
+use chaic_nn::{Pass, Tensor};
+
+use crate::instances::{Instance, Pixels, Segment};
+use crate::labels::BACKGROUND;
+use crate::loss::exp;
+use crate::roi::{RoiBox, RoiSource, SIDE};
+use crate::roi_network::{N_QUALITIES, RoiNetwork};
+
+/// Number of proposals that run through the network together.
+const BATCH_SIZE: usize = 16;
+/// Of two instances with a greater overlap (intersection over union), the one with the higher score
+/// is kept.
+const SUPPRESSION_IOU: f32 = 0.5;
+/// Instances of which less than this fraction remains, after others took their pixels, are dropped.
+const MIN_REMAINING: f32 = 0.4;
+/// Instances with a lower score are dropped.
+const MIN_SCORE: f32 = 0.02;
+/// Number of names of an instance, at most, and minimum probability of those after the first.
+const MAX_NAMES: usize = 4;
+const MIN_NAME_PROBABILITY: f32 = 0.02;
+
+/// Second stage with its parameters.
+#[derive(Clone, Debug)]
+pub struct SecondStage {
+    /// The network.
+    pub network: RoiNetwork,
+    /// Parameters of the network.
+    pub parameters: Vec<f32>,
+}
+
+/// Output for a proposal.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RoiOutput {
+    /// Probability of each label.
+    pub probabilities: Vec<f32>,
+    /// Predicted intersection over union of the proposal's mask and of the redrawn mask with the
+    /// object.
+    pub qualities: [f32; N_QUALITIES],
+    /// Logits of the redrawn mask, shape [`SIDE`, `SIDE`].
+    pub mask: Vec<f32>,
+}
+
+/// Logistic function.
+pub(crate) fn sigmoid(x: f32) -> f32 {
+    let e = exp(-x.abs());
+    if x >= 0.0 { 1.0 / (1.0 + e) } else { e / (1.0 + e) }
+}
+
+/// Softmax of logits.
+pub(crate) fn softmax(logits: &[f32]) -> Vec<f32> {
+    let max = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    let mut probabilities: Vec<f32> = logits.iter().map(|x| exp(x - max)).collect();
+    let sum: f32 = probabilities.iter().sum();
+    probabilities.iter_mut().for_each(|p| *p /= sum);
+    probabilities
+}
+
+impl SecondStage {
+    /// Creates buffers for inference.
+    pub fn pass(&self) -> Pass {
+        Pass::new(&self.network.network, widest())
+    }
+
+    /// Runs the network on proposals.
+    pub fn outputs(
+        &self,
+        source: &RoiSource<'_>,
+        proposals: &[Segment],
+        pass: &mut Pass,
+    ) -> Vec<(RoiBox, RoiOutput)> {
+        let mut outputs = Vec::with_capacity(proposals.len());
+        let mut inputs: [Tensor; 2] = Default::default();
+        for batch in proposals.chunks(BATCH_SIZE) {
+            let boxes = fill_inputs(source, batch, &mut inputs);
+            let [crops, scalars] = &inputs;
+            let RoiNetwork { network, labels, qualities, mask } = &self.network;
+            pass.forward_all(network, &self.parameters, &[crops, scalars]);
+            let labels = &pass.activation(*labels).data;
+            let qualities = &pass.activation(*qualities).data;
+            let mask = &pass.activation(*mask).data;
+            let n_labels = labels.len() / batch.len();
+            for (k, roi) in boxes.into_iter().enumerate() {
+                let output = RoiOutput {
+                    probabilities: softmax(&labels[k * n_labels..][..n_labels]),
+                    qualities: std::array::from_fn(|q| sigmoid(qualities[k * N_QUALITIES + q])),
+                    mask: mask[k * SIDE * SIDE..][..SIDE * SIDE].to_vec(),
+                };
+                outputs.push((roi, output));
+            }
+        }
+        outputs
+    }
+
+    /// Returns the objects among proposals, with uncalibrated scores.
+    pub fn instances(
+        &self,
+        source: &RoiSource<'_>,
+        proposals: &[Segment],
+        depth_m: &[f32],
+        pass: &mut Pass,
+    ) -> Vec<Instance> {
+        let pixels = source.pixels;
+        let outputs = self.outputs(source, proposals, pass);
+        let candidates = proposals
+            .iter()
+            .zip(&outputs)
+            .filter_map(|(proposal, (roi, output))| Candidate::new(pixels, proposal, *roi, output));
+        let mut candidates: Vec<Candidate> = candidates.collect();
+        candidates.sort_by(|a, b| {
+            b.segment
+                .score
+                .total_cmp(&a.segment.score)
+                .then(a.segment.pixels.cmp(&b.segment.pixels))
+        });
+        let kept = suppress(candidates, pixels.pixels().len());
+        let (segments, names): (Vec<Segment>, Vec<_>) =
+            kept.into_iter().map(|c| (c.segment, c.names)).unzip();
+        let masks = pixels.masks(&segments, depth_m);
+        let instances = segments.into_iter().zip(names).zip(masks);
+        instances
+            .filter(|(_, mask)| !mask.is_empty())
+            .map(|((segment, names), pixels)| {
+                let Segment { label, score, center, .. } = segment;
+                Instance { label, score, pixels, center, names }
+            })
+            .collect()
+    }
+}
+
+/// Writes crops and scalars of proposals.
+pub(crate) fn fill_inputs(
+    source: &RoiSource<'_>,
+    proposals: &[Segment],
+    [crops, scalars]: &mut [Tensor; 2],
+) -> Vec<RoiBox> {
+    let [crop_shape, scalar_shape] = RoiNetwork::input_shapes(proposals.len());
+    crops.reshape(crop_shape);
+    scalars.reshape(scalar_shape);
+    let crops = crops.data.chunks_exact_mut(crop_shape.len_per_item());
+    let scalars = scalars.data.chunks_exact_mut(scalar_shape.len_per_item());
+    let proposals = proposals.iter().zip(crops.zip(scalars));
+    proposals.map(|(proposal, (crop, scalars))| source.write(proposal, crop, scalars)).collect()
+}
+
+/// Object that a proposal may show.
+struct Candidate {
+    /// The better mask, with the most probable label and its score.
+    segment: Segment,
+    /// Labels with their scores, in descending order.
+    names: Vec<(u8, f32)>,
+}
+
+impl Candidate {
+    /// Returns `None` if the score is too low or no pixel is left.
+    fn new(
+        pixels: &Pixels,
+        proposal: &Segment,
+        roi: RoiBox,
+        output: &RoiOutput,
+    ) -> Option<Candidate> {
+        let [original, redrawn] = output.qualities;
+        let quality = original.max(redrawn);
+        let mut names: Vec<(u8, f32)> = (1..output.probabilities.len())
+            .map(|label| (label as u8, output.probabilities[label]))
+            .collect();
+        names.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        names.truncate(MAX_NAMES);
+        let first = *names.first()?;
+        names.retain(|name| *name == first || name.1 > MIN_NAME_PROBABILITY);
+        names.iter_mut().for_each(|(_, p)| *p *= quality);
+        let (label, score) = names[0];
+        // Also refuses a score that is not a number.
+        let is_likely = score >= MIN_SCORE;
+        if !is_likely {
+            return None;
+        }
+        let mask = if redrawn > original {
+            redrawn_pixels(&output.mask, roi, pixels)
+        } else {
+            proposal.pixels.clone()
+        };
+        let center = mean_point(pixels, &mask)?;
+        Some(Candidate { segment: Segment { label, score, pixels: mask, center }, names })
+    }
+}
+
+/// Returns the network pixels of a redrawn mask, by bilinear interpolation of its logits.
+pub(crate) fn redrawn_pixels(mask: &[f32], roi: RoiBox, pixels: &Pixels) -> Vec<u32> {
+    let columns = pixels.columns();
+    let rows = pixels.pixels().len() / columns;
+    let range = |axis: usize, n: usize| {
+        let low = roi.origin[axis].max(0.0) as usize;
+        let high = (roi.origin[axis] + roi.side).clamp(0.0, n as f32) as usize;
+        low..high
+    };
+    let position = |axis: usize, k: usize| {
+        let at = (k as f32 + 0.5 - roi.origin[axis]) / roi.step() - 0.5;
+        let at = at.clamp(0.0, (SIDE - 1) as f32);
+        let low = (at as usize).min(SIDE - 2);
+        (low, at - low as f32)
+    };
+    let mut members = Vec::new();
+    for y in range(1, rows) {
+        let (j, v) = position(1, y);
+        for x in range(0, columns) {
+            let (i, u) = position(0, x);
+            let at = |i: usize, j: usize| mask[j * SIDE + i];
+            let upper = at(i, j) + u * (at(i + 1, j) - at(i, j));
+            let lower = at(i, j + 1) + u * (at(i + 1, j + 1) - at(i, j + 1));
+            if upper + v * (lower - upper) > 0.0 {
+                members.push((y * columns + x) as u32);
+            }
+        }
+    }
+    members
+}
+
+/// Mean position of pixels in the camera's frame, meters.
+fn mean_point(pixels: &Pixels, members: &[u32]) -> Option<[f32; 3]> {
+    let n = members.len() as f32;
+    let points = || members.iter().map(|k| pixels.pixels()[*k as usize].point);
+    (n > 0.0).then(|| std::array::from_fn(|axis| points().map(|p| p[axis]).sum::<f32>() / n))
+}
+
+/// Drops candidates that show the same object as a better one, and gives each pixel to the best
+/// candidate; candidates come in descending order of score.
+fn suppress(candidates: Vec<Candidate>, n_pixels: usize) -> Vec<Candidate> {
+    let mut kept: Vec<(Candidate, usize)> = Vec::new();
+    let mut owner = vec![u16::MAX; n_pixels];
+    for mut candidate in candidates {
+        debug_assert_ne!(candidate.segment.label, BACKGROUND);
+        let n = candidate.segment.pixels.len();
+        let is_same = kept.iter().any(|(other, _)| {
+            let shared = n_shared(&candidate.segment.pixels, &other.segment.pixels);
+            let union = n + other.segment.pixels.len() - shared;
+            shared as f32 > SUPPRESSION_IOU * union as f32
+        });
+        if is_same {
+            continue;
+        }
+        candidate.segment.pixels.retain(|k| owner[*k as usize] == u16::MAX);
+        if (candidate.segment.pixels.len() as f32) < MIN_REMAINING * n as f32 {
+            continue;
+        }
+        for k in &candidate.segment.pixels {
+            owner[*k as usize] = kept.len() as u16;
+        }
+        kept.push((candidate, n));
+    }
+    kept.into_iter().map(|(candidate, _)| candidate).collect()
+}
+
+/// Number of common elements of two ascending lists.
+pub(crate) fn n_shared(a: &[u32], b: &[u32]) -> usize {
+    let (mut i, mut j, mut n) = (0, 0, 0);
+    while i < a.len() && j < b.len() {
+        match a[i].cmp(&b[j]) {
+            std::cmp::Ordering::Less => i += 1,
+            std::cmp::Ordering::Greater => j += 1,
+            std::cmp::Ordering::Equal => {
+                n += 1;
+                i += 1;
+                j += 1;
+            }
+        }
+    }
+    n
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn candidate(pixels: &[u32], score: f32) -> Candidate {
+        let segment = Segment { label: 3, score, pixels: pixels.to_vec(), center: [0.0; 3] };
+        Candidate { segment, names: vec![(3, score)] }
+    }
+
+    #[test]
+    fn the_better_of_overlapping_candidates_is_kept_and_owns_the_shared_pixels() {
+        let candidates = vec![
+            candidate(&[0, 1, 2, 3], 0.9),
+            candidate(&[1, 2, 3], 0.8),
+            candidate(&[3, 4, 5], 0.7),
+            candidate(&[2, 3, 6], 0.6),
+        ];
+        let kept = suppress(candidates, 8);
+        let pixels: Vec<&[u32]> = kept.iter().map(|c| &c.segment.pixels[..]).collect();
+        assert_eq!(pixels, [&[0, 1, 2, 3][..], &[4, 5]]);
+    }
+
+    #[test]
+    fn common_elements_are_counted() {
+        assert_eq!(n_shared(&[1, 4, 7], &[0, 4, 5, 7, 9]), 2);
+        assert_eq!(n_shared(&[], &[1]), 0);
+    }
+}

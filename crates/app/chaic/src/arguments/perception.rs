@@ -40,7 +40,7 @@ pub struct TrainArguments {
     /// Initial weights, a safetensors file, instead of random ones.
     #[arg(long, value_name = "FILE", conflicts_with = "resume")]
     pub weights: Option<PathBuf>,
-    /// Total number of steps, 1 to 1000000000; the learning rate schedule depends on it.
+    /// Number of steps, of the first stage for `detection`, 1 to 1000000000; the learning rate schedule depends on it.
     #[arg(long, value_name = "N", conflicts_with = "resume")]
     #[arg(value_parser = clap::value_parser!(u64).range(ranges::STEPS))]
     pub steps: Option<u64>,

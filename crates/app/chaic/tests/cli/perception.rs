@@ -8,9 +8,9 @@ use super::{output_of, run_err, run_ok, text};
 const EVAL: [&str; 9] =
     ["eval", "--task", "high_goal", "--first", "1", "--helper", "rhp", "--size", "64"];
 
-/// Configuration of a training with small images and two steps.
+/// Configuration of a training with small images and one step of each stage.
 const TINY: &str = "
-steps = 2
+steps = 1
 warm_up = 1
 [[crops]]
 views = 1
@@ -24,6 +24,9 @@ side_px = 32
 uniform_crop_fraction = 0.3
 [views]
 size_px = 64
+[second_stage]
+steps = 1
+views = 1
 ";
 
 #[test]

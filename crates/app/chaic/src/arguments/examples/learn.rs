@@ -68,7 +68,10 @@ pub(super) const EXAMPLES: &[CommandExamples] = &[
         "chaic train detection",
         [
             ("Train with the default configuration", "chaic train detection --out runs/detection"),
-            ("Train for fewer steps", "chaic train detection --steps 1000 --out runs/short"),
+            (
+                "Train for fewer steps",
+                "chaic train detection --steps 1000 --set second_stage.steps=500 --out runs/short",
+            ),
             ("Continue a training", "chaic train detection --resume --out runs/detection"),
         ],
     ),

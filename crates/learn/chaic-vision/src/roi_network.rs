@@ -21,7 +21,7 @@ const EMBEDDING_WIDTH: usize = 256;
 /// Predicted overlaps with the object: of the proposal's mask and of the redrawn mask.
 pub const N_QUALITIES: usize = 2;
 
-/// Network of the second stage: 10 million multiplications per proposal.
+/// Network of the second stage: 12 million multiplications per proposal.
 #[derive(Clone, Debug)]
 pub struct RoiNetwork {
     /// All layers. Inputs are crops and scalars.

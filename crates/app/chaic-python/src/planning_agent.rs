@@ -324,9 +324,9 @@ impl Detector {
             let mut mask = vec![false; width * height];
             instance.pixels.iter().for_each(|p| mask[*p as usize] = true);
             let row = PyDict::new(py);
-            let class = chaic_vision::labels::class_of(instance.label);
+            let class = chaic_vision::labels::class_of(instance.label());
             row.set_item("class", class.map(|class| class.name()))?;
-            row.set_item("score", instance.score)?;
+            row.set_item("score", instance.score())?;
             row.set_item("mask", PyArray1::from_vec(py, mask).reshape([height, width])?)?;
             list.append(row)?;
         }

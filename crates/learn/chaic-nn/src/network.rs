@@ -120,14 +120,12 @@ impl Network {
     }
 
     /// Adds the parameters of another network, which no layer of this one reads, with a prefix to
-    /// their names. Returns their range.
-    pub fn append_parameters(&mut self, prefix: &str, other: &Network) -> Range<usize> {
-        let start = self.n_parameters();
+    /// their names.
+    pub fn append_parameters(&mut self, prefix: &str, other: &Network) {
         for parameter in &other.parameters {
             let name = format!("{prefix}{}", parameter.name);
             self.add_parameter(name, &parameter.shape, parameter.has_weight_decay);
         }
-        start..self.n_parameters()
     }
 
     /// Adds a dense convolution without bias.

@@ -63,9 +63,10 @@ fn draw(view: &LabeledView, detections: &[Instance]) -> RgbImage {
     let (width, height) = (view.camera.width, view.camera.height);
     let mut picture = RgbImage::from_raw(width, height, view.rgb.clone())
         .expect("the buffer has the camera's size");
-    let reported: Vec<&Instance> = detections.iter().filter(|f| f.score >= REPORT_SCORE).collect();
+    let reported: Vec<&Instance> =
+        detections.iter().filter(|f| f.score() >= REPORT_SCORE).collect();
     for instance in &reported {
-        let hue = |m: u32| (u32::from(instance.label) * m % 160 + 95) as u8;
+        let hue = |m: u32| (u32::from(instance.label()) * m % 160 + 95) as u8;
         for k in &instance.pixels {
             let pixel = picture.get_pixel_mut(k % width, k / width);
             for (c, m) in pixel.0.iter_mut().zip([37, 91, 143]) {
@@ -88,7 +89,7 @@ fn draw(view: &LabeledView, detections: &[Instance]) -> RgbImage {
             instance.pixels.iter().map(|k| coordinate(*k, width)).sum::<u32>() as f32 / n as f32
         };
         let at = (mean(|k, width| k % width), mean(|k, width| k / width) - 7.0);
-        let name = class_of(instance.label).map_or("", |class| class.info().label);
+        let name = class_of(instance.label()).map_or("", |class| class.info().label);
         text::draw(&mut picture, (at.0 + 1.0, at.1 + 1.0), 15.0, [0; 3], Align::Center, name);
         text::draw(&mut picture, at, 15.0, INK, Align::Center, name);
     }

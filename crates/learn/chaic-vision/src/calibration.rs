@@ -4,7 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::loss::{exp, ln};
+use crate::loss::{ln, sigmoid};
 
 /// Number of predictors: 1, log odds of the mean probability, log number of pixels, log distance in
 /// meters.
@@ -46,8 +46,7 @@ impl Calibration {
     /// Returns the probability that a detection with these predictors is correct.
     pub fn probability(&self, predictors: &[f32; N_PREDICTORS]) -> f32 {
         let log_odds: f32 = self.coefficients.iter().zip(predictors).map(|(f, x)| f * x).sum();
-        let e = exp(-log_odds.abs());
-        if log_odds < 0.0 { e / (1.0 + e) } else { 1.0 / (1.0 + e) }
+        sigmoid(log_odds)
     }
 
     /// Fits the coefficients by Newton's method with weak L2 regularization.

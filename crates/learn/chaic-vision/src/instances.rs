@@ -11,18 +11,31 @@ use crate::loss::exp;
 /// Detected object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Instance {
-    /// Its label, never the background.
-    pub label: u8,
-    /// Score, 0 to 1.
-    pub score: f32,
+    /// Labels that the object may have, never the background, with their scores from 0 to 1. There
+    /// is at least one; scores descend.
+    pub names: Vec<(u8, f32)>,
     /// Row-major indices of its pixels in the image, ascending.
     pub pixels: Vec<u32>,
     /// Center of the visible part in the camera's frame (x right, y up, z towards the camera),
     /// meters.
     pub center: [f32; 3],
-    /// Labels that the object may have, with their scores, in descending order; the first is
-    /// [`Instance::label`].
-    pub names: Vec<(u8, f32)>,
+}
+
+impl Instance {
+    /// Returns the most probable label.
+    pub fn label(&self) -> u8 {
+        self.names[0].0
+    }
+
+    /// Returns the score of the most probable label.
+    pub fn score(&self) -> f32 {
+        self.names[0].1
+    }
+}
+
+/// Sorts instances by score, in descending order.
+pub(crate) fn sort_by_score(instances: &mut [Instance]) {
+    instances.sort_by(|a, b| b.score().total_cmp(&a.score()).then(a.pixels[0].cmp(&b.pixels[0])));
 }
 
 /// Thresholds of the grouping. "Half extents" are those of the label's class.
@@ -186,10 +199,10 @@ impl Pixels {
             .filter(|(_, mask)| !mask.is_empty())
             .map(|(segment, pixels)| {
                 let Segment { label, score, center, .. } = *segment;
-                Instance { label, score, pixels, center, names: vec![(label, score)] }
+                Instance { names: vec![(label, score)], pixels, center }
             })
             .collect();
-        found.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.pixels[0].cmp(&b.pixels[0])));
+        sort_by_score(&mut found);
         found
     }
 

@@ -157,6 +157,20 @@ pub(crate) fn exp(x: f32) -> f32 {
     y
 }
 
+/// Logistic function.
+pub(crate) fn sigmoid(x: f32) -> f32 {
+    let e = exp(-x.abs());
+    if x < 0.0 { e / (1.0 + e) } else { 1.0 / (1.0 + e) }
+}
+
+/// Replaces logits by probabilities.
+pub(crate) fn softmax(values: &mut [f32]) {
+    let max = values.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    values.iter_mut().for_each(|x| *x = exp(*x - max));
+    let sum: f32 = values.iter().sum();
+    values.iter_mut().for_each(|x| *x /= sum);
+}
+
 /// Natural logarithm of a positive number: inverts [`exp`] by Newton's method.
 pub(crate) fn ln(x: f32) -> f32 {
     let mut y = (x.to_bits() as f32 / 8_388_608.0 - 126.94) * std::f32::consts::LN_2;

@@ -183,13 +183,7 @@ impl NoisyPerception {
                 _ => (*class, correct_score),
             };
             let label = label_of(Some(class));
-            instances.push(Instance {
-                label,
-                score,
-                pixels,
-                center: [0.0; 3],
-                names: vec![(label, score)],
-            });
+            instances.push(Instance { names: vec![(label, score)], pixels, center: [0.0; 3] });
         }
         let (width, height) = (observation.camera.width, observation.camera.height);
         let classes: Vec<ClassId> = ClassId::all().filter(|c| c.info().is_carriable()).collect();
@@ -203,13 +197,8 @@ impl NoisyPerception {
             let row = |y: u32| (y * width + x..y * width + x + SIDE).collect::<Vec<u32>>();
             let pixels = (y..y + SIDE).flat_map(row).collect();
             let label = label_of(Some(*class));
-            instances.push(Instance {
-                label,
-                score: wrong_score,
-                pixels,
-                center: [0.0; 3],
-                names: vec![(label, wrong_score)],
-            });
+            let names = vec![(label, wrong_score)];
+            instances.push(Instance { names, pixels, center: [0.0; 3] });
         }
         instances
     }

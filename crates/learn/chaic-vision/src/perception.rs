@@ -147,7 +147,8 @@ fn measure(
         instance.pixels.iter().for_each(|p| segment_ids[*p as usize] = 1 + k as u16);
     }
     let kind = |instance: &Instance| {
-        crate::labels::class_of(instance.label).map_or(PixelKind::Background, PixelKind::from_class)
+        crate::labels::class_of(instance.label())
+            .map_or(PixelKind::Background, PixelKind::from_class)
     };
     let kinds: Vec<PixelKind> =
         std::iter::once(PixelKind::Background).chain(instances.iter().map(kind)).collect();
@@ -158,7 +159,7 @@ fn measure(
     let mut measurements = Vec::new();
     for (k, (instance, extent)) in instances.iter().zip(extents.into_iter().skip(1)).enumerate() {
         if let Some(extent) = extent {
-            let Instance { label, score, .. } = *instance;
+            let (label, score) = (instance.label(), instance.score());
             measurements.push(Measurement { label, score, extent });
             segment_numbers[k + 1] = measurements.len() as u16;
         }

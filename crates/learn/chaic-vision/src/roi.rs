@@ -6,7 +6,7 @@ use chaic_core::geom::Camera;
 use crate::detector::STRIDE;
 use crate::features::N_FEATURES;
 use crate::instances::{Pixel, Pixels, Segment};
-use crate::labels::n_labels;
+use crate::labels::{BACKGROUND, n_labels};
 use crate::loss::ln;
 
 /// Side of a crop, samples.
@@ -154,7 +154,7 @@ impl RoiSource<'_> {
             let is_member = proposal.pixels.binary_search(&(at as u32)).is_ok();
             sample[8] = f32::from(u8::from(is_member));
             sample[9] = f32::from(u8::from(label == proposal.label));
-            if label != crate::labels::BACKGROUND {
+            if label != BACKGROUND {
                 let distance = (0..3).map(|axis| {
                     let d = (vote[axis] - proposal.center[axis]) / half_m;
                     d * d

@@ -5,10 +5,9 @@ use chaic_nn::{Pass, Tensor};
 use crate::detector::STRIDE;
 use crate::instances::Segment;
 use crate::labels::BACKGROUND;
-use crate::loss::{exp, ln};
+use crate::loss::{exp, ln, sigmoid, softmax};
 use crate::roi::{RoiBox, SIDE};
 use crate::roi_network::{N_QUALITIES, RoiNetwork};
-use crate::second_stage::sigmoid;
 use crate::views::LabeledView;
 
 /// Coefficient of the losses of mask and qualities, relative to that of labels.
@@ -140,7 +139,8 @@ pub fn roi_loss(network: &RoiNetwork, targets: &[RoiTarget], pass: &mut Pass) ->
     let n_labels = label_logits.shape.channels;
     for (k, target) in targets.iter().enumerate() {
         let row = &label_logits.data[k * n_labels..][..n_labels];
-        let probabilities = crate::second_stage::softmax(row);
+        let mut probabilities = row.to_vec();
+        softmax(&mut probabilities);
         let wanted = usize::from(target.label);
         let max = row.iter().copied().fold(f32::NEG_INFINITY, f32::max);
         loss.labels -= f64::from(normalizer * ln(probabilities[wanted].max(1e-12)));

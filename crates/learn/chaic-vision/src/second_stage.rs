@@ -6,14 +6,14 @@ use chaic_nn::{Pass, Tensor};
 
 use crate::instances::{Instance, Pixels, Segment};
 use crate::labels::BACKGROUND;
-use crate::loss::exp;
+use crate::loss::{sigmoid, softmax};
 use crate::roi::{RoiBox, RoiSource, SIDE};
 use crate::roi_network::{N_QUALITIES, RoiNetwork};
 
 /// Number of proposals that run through the network together.
 const BATCH_SIZE: usize = 16;
-/// Of two instances with a greater overlap (intersection over union), the one with the higher score
-/// is kept.
+/// If two instances overlap more than this (intersection over union), the one with the lower score
+/// is dropped.
 const SUPPRESSION_IOU: f32 = 0.5;
 /// Instances of which less than this fraction remains, after others took their pixels, are dropped.
 const MIN_REMAINING: f32 = 0.4;
@@ -44,21 +44,6 @@ pub struct RoiOutput {
     pub mask: Vec<f32>,
 }
 
-/// Logistic function.
-pub(crate) fn sigmoid(x: f32) -> f32 {
-    let e = exp(-x.abs());
-    if x >= 0.0 { 1.0 / (1.0 + e) } else { e / (1.0 + e) }
-}
-
-/// Softmax of logits.
-pub(crate) fn softmax(logits: &[f32]) -> Vec<f32> {
-    let max = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-    let mut probabilities: Vec<f32> = logits.iter().map(|x| exp(x - max)).collect();
-    let sum: f32 = probabilities.iter().sum();
-    probabilities.iter_mut().for_each(|p| *p /= sum);
-    probabilities
-}
-
 impl SecondStage {
     /// Creates buffers for inference.
     pub fn pass(&self) -> Pass {
@@ -84,8 +69,10 @@ impl SecondStage {
             let mask = &pass.activation(*mask).data;
             let n_labels = labels.len() / batch.len();
             for (k, roi) in boxes.into_iter().enumerate() {
+                let mut probabilities = labels[k * n_labels..][..n_labels].to_vec();
+                softmax(&mut probabilities);
                 let output = RoiOutput {
-                    probabilities: softmax(&labels[k * n_labels..][..n_labels]),
+                    probabilities,
                     qualities: std::array::from_fn(|q| sigmoid(qualities[k * N_QUALITIES + q])),
                     mask: mask[k * SIDE * SIDE..][..SIDE * SIDE].to_vec(),
                 };
@@ -123,10 +110,7 @@ impl SecondStage {
         let instances = segments.into_iter().zip(names).zip(masks);
         instances
             .filter(|(_, mask)| !mask.is_empty())
-            .map(|((segment, names), pixels)| {
-                let Segment { label, score, center, .. } = segment;
-                Instance { label, score, pixels, center, names }
-            })
+            .map(|((segment, names), pixels)| Instance { names, pixels, center: segment.center })
             .collect()
     }
 }

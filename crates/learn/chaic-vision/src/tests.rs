@@ -11,10 +11,11 @@ use chaic_nn::simd::widest;
 use chaic_nn::{Pass, Shape, Tensor};
 
 use crate::average_precision::average_precision;
+use crate::coco::results;
 use crate::detector::{Detector, N_OFFSETS, STRIDE};
 use crate::evaluate::{MIN_AREA_PX, compare, report};
 use crate::features::{ImageCrop, N_FEATURES, features};
-use crate::instances::{InstanceConfig, Pixels, instances};
+use crate::instances::{Instance, InstanceConfig, Pixels, instances};
 use crate::labels::{BACKGROUND, class_of, label_of, n_labels};
 use crate::loss::{LossConfig, Targets, loss};
 use crate::proposals::proposals;
@@ -246,7 +247,7 @@ fn invalid_images_give_no_detections() {
         for gray in [0, 255] {
             let (rgb, depth_m) = (vec![gray; 3 * 64 * 64], vec![depth_m; 64 * 64]);
             let found = trained.detect(&rgb, &depth_m, &camera, &mut inference);
-            assert!(found.iter().all(|f| f.score.is_finite() && (0.0..=1.0).contains(&f.score)));
+            assert!(found.iter().all(|f| (0.0..=1.0).contains(&f.score())));
         }
     }
     assert!(!trained.fits(&Camera { width: 65, ..camera }));
@@ -367,6 +368,19 @@ fn second_stage_gradients_match_finite_differences() {
             assert!(is_equal, "{name} {k}: {measured} for {exact}");
         }
     }
+}
+
+#[test]
+fn each_name_of_an_instance_is_a_detection() {
+    let view = SyntheticViews::new(DatasetSplit::Validation, tiny().views, 7, 1).draw();
+    let pixels = vec![0, 1, 2];
+    let instance = Instance { names: vec![(4, 0.6), (9, 0.2)], pixels, center: [0.0; 3] };
+    let found = compare(&view, std::slice::from_ref(&instance)).detections;
+    let names: Vec<(u8, f32)> = found.iter().map(|d| (d.label, d.score)).collect();
+    assert_eq!(names, instance.names);
+    assert_eq!(found[0].intersections, found[1].intersections);
+    let results = results(1, &view, &[instance]);
+    assert_eq!(results.len(), 2);
 }
 
 #[test]

@@ -26,7 +26,7 @@ use crate::roi_loss::RoiLoss;
 use crate::roi_network::RoiNetwork;
 use crate::roi_train::{ROI_BOUNDS, RoiBatch, RoiTrainingConfig, mean_roi_loss};
 use crate::second_stage::SecondStage;
-use crate::trained::{TrainedDetector, both_stages};
+use crate::trained::{SECOND_STAGE, TrainedDetector, both_stages};
 use crate::views::{DatasetSplit, LabeledView, SyntheticViews, ViewConfig};
 
 /// Crops of a batch.
@@ -224,9 +224,6 @@ pub struct DetectorLearner {
     /// The trained first stage, for each shard of the second.
     first_stages: Vec<Mutex<Inference>>,
 }
-
-/// Prefix of the second stage's sections in checkpoints.
-const SECOND_STAGE: &str = "roi.";
 
 /// Metrics of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]

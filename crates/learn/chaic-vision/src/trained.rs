@@ -9,7 +9,7 @@ use chaic_nn::{Inference, Network, Pass, Shape, weights};
 use crate::calibration::{Calibration, N_PREDICTORS, predictors};
 use crate::detector::Detector;
 use crate::features::{ImageCrop, N_FEATURES, features};
-use crate::instances::{Instance, InstanceConfig, Pixels};
+use crate::instances::{Instance, InstanceConfig, Pixels, sort_by_score};
 use crate::proposals::proposals;
 use crate::roi::RoiSource;
 use crate::roi_network::RoiNetwork;
@@ -28,8 +28,8 @@ pub struct TrainedDetector {
     pub calibration: Calibration,
 }
 
-/// Name of the second stage's parameters in weights files.
-const SECOND_STAGE: &str = "roi.";
+/// Prefix of the second stage's parameters in weights files, and of its sections in checkpoints.
+pub(crate) const SECOND_STAGE: &str = "roi.";
 
 /// Returns the kind in weights files: format version, number of stages, and digest of the classes.
 fn kind(n_stages: usize) -> String {
@@ -174,9 +174,8 @@ impl TrainedDetector {
                 let predictors = predictors(*score, instance.pixels.len(), instance.center);
                 *score = self.calibration.probability(&predictors);
             }
-            instance.score = instance.names[0].1;
         }
-        instances.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.pixels[0].cmp(&b.pixels[0])));
+        sort_by_score(&mut instances);
         instances
     }
 }

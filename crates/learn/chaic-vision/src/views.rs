@@ -590,3 +590,26 @@ fn exp2(x: f32) -> f32 {
     let exponent = x.floor();
     f32::from_bits(((exponent as i32 + 127) as u32) << 23) * (1.0 + x - exponent)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn adjacent_panels_are_one_instance_and_other_objects_stay_apart() {
+        let panel =
+            |x: f32, z: f32| ObjectSpec::new(ClassId::named("fence"), Vec3::new(x, 0.0, z), 0.0);
+        let armchair = ObjectSpec::new(ClassId::named("armchair"), Vec3::new(1.0, 0.0, 0.0), 0.0);
+        let seeds = GeneratorSeeds { place: 1, episode: 1 };
+        let mut setup = generate_with(TaskId::Shopping, seeds, Settings::PAPER).unwrap();
+        // Three panels in a row, given out of order; one beyond a gate; one across the street.
+        setup.things =
+            vec![panel(4.02, 0.0), panel(0.0, 0.0), armchair, panel(2.01, 0.0), panel(8.0, 0.0)];
+        setup.things.push(panel(2.0, 9.0));
+        let first = usize::from(EntityId::FIRST_OBJECT.0);
+        let ids = instance_ids(&setup, first + setup.things.len());
+        let row = first as u16;
+        assert_eq!(ids[first..], [row, row, row + 2, row, row + 4, row + 5]);
+        assert!((0..first).all(|k| ids[k] == k as u16));
+    }
+}

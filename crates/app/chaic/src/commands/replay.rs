@@ -83,8 +83,8 @@ impl DetectedMasks {
 impl Masks for DetectedMasks {
     fn find(&mut self, rgb: &[u8], depth_m: &[f32], camera: &Camera) -> Vec<(u8, Vec<u32>)> {
         let found = self.detector.detect(rgb, depth_m, camera, &mut self.inference);
-        let reported = found.into_iter().filter(|instance| instance.score >= REPORT_SCORE);
-        reported.map(|instance| (instance.label, instance.pixels)).collect()
+        let reported = found.into_iter().filter(|instance| instance.score() >= REPORT_SCORE);
+        reported.map(|instance| (instance.label(), instance.pixels)).collect()
     }
 
     fn image_size(&self) -> u32 {

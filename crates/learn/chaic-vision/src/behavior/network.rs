@@ -140,8 +140,7 @@ pub type Outputs = [f32; Behavior::ALL.len()];
 
 /// Softmax.
 pub fn softmax(outputs: &Outputs) -> Outputs {
-    let max = outputs.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-    let exponentials = outputs.map(|x| crate::loss::exp(x - max));
-    let sum: f32 = exponentials.iter().sum();
-    exponentials.map(|x| x / sum)
+    let mut probabilities = *outputs;
+    crate::loss::softmax(&mut probabilities);
+    probabilities
 }

@@ -7,7 +7,7 @@ use chaic_core::TaskId;
 use chaic_env::Track;
 use chaic_env::helper_registry::NONE;
 use chaic_eval::metrics::{FormulaSet, Score, Scores};
-use chaic_eval::report::{Format, Report, rounded, shown_interval, title};
+use chaic_eval::report::{Format, Labels, Report, rounded, shown_interval};
 use chaic_eval::run::{Run, RunFolder};
 use serde_json::{Value, json};
 
@@ -68,7 +68,7 @@ pub fn scores_text(report: &Report<'_>, folder: &Path, more: &[(&str, String)]) 
     footer.extend(labeled.map(|(label, value)| format!("{:8} {value}", format!("{label}:"))));
     let lines_of = |n_helpers: usize| {
         let shown = &helpers[..n_helpers];
-        let mut lines = table(&scores, shown);
+        let mut lines = table(&scores, report.labels(), shown);
         lines.push(String::new());
         lines.extend(grants(report, shown));
         if n_helpers < helpers.len() {
@@ -88,7 +88,7 @@ pub fn scores_text(report: &Report<'_>, folder: &Path, more: &[(&str, String)]) 
 }
 
 /// Formats the table: a row per helper, with the mean over its interval, and a column per task.
-fn table(scores: &Scores, helpers: &[String]) -> Vec<String> {
+fn table(scores: &Scores, labels: Labels<'_>, helpers: &[String]) -> Vec<String> {
     let tasks = scores.tasks();
     let mut lines =
         vec!["Transport rate: mean, and 95 % interval over environments".to_owned(), String::new()];
@@ -96,13 +96,18 @@ fn table(scores: &Scores, helpers: &[String]) -> Vec<String> {
         if k > 0 {
             lines.push(String::new());
         }
-        lines.extend(block(scores, helpers, tasks));
+        lines.extend(block(scores, labels, helpers, tasks));
     }
     lines
 }
 
 /// Formats the columns of some tasks.
-fn block(scores: &Scores, helpers: &[String], tasks: &[TaskId]) -> Vec<String> {
+fn block(
+    scores: &Scores,
+    labels: Labels<'_>,
+    helpers: &[String],
+    tasks: &[TaskId],
+) -> Vec<String> {
     let heads: Vec<[String; 2]> = tasks.iter().map(|task| split_title(task.info().title)).collect();
     let widths: Vec<usize> = heads
         .iter()
@@ -124,7 +129,7 @@ fn block(scores: &Scores, helpers: &[String], tasks: &[TaskId]) -> Vec<String> {
         .flat_map(|task| helpers.iter().filter_map(|helper| scores.get(*task, helper)))
         .any(|score| shown_interval(score).is_some());
     for helper in helpers {
-        let [name, rest] = wrapped_name(&title(helper));
+        let [name, rest] = wrapped_name(&labels.name(helper));
         let cells: Vec<[String; 2]> =
             tasks.iter().map(|task| cell(scores, *task, helper)).collect();
         let column = |k: usize| cells.iter().map(|cell| cell[k].clone()).collect::<Vec<_>>();

@@ -37,17 +37,27 @@ pub struct GrantsFile {
 }
 
 impl Labels<'_> {
+    /// Returns the helper's title, with "+BM" for language helpers with a behavior network, as the
+    /// paper names them.
+    pub fn name(&self, helper: &str) -> String {
+        let is_behavior = |part: &str| part.starts_with("behavior ");
+        let perception = self.granted.and_then(|granted| granted.perception.get(helper));
+        let has_network = perception.is_some_and(|text| text.split(", ").any(is_behavior));
+        let is_language = ["llm", "vlm"].contains(&helper);
+        if has_network && is_language { title(helper) + "+BM" } else { title(helper) }
+    }
+
     /// Returns the helper's title and grants on one line.
     pub fn title(&self, helper: &str) -> String {
         match self.grants(helper) {
-            Some(words) => format!("{} ({})", title(helper), words.join(", ")),
-            None => title(helper),
+            Some(words) => format!("{} ({})", self.name(helper), words.join(", ")),
+            None => self.name(helper),
         }
     }
 
     /// Returns the label on several lines, each short enough for the first column of a table.
     pub fn lines(&self, helper: &str) -> String {
-        let mut lines = vec![title(helper)];
+        let mut lines = vec![self.name(helper)];
         for words in self.grants(helper).unwrap_or_default() {
             let mut line = String::new();
             for word in words.split(' ') {
@@ -67,7 +77,7 @@ impl Labels<'_> {
     pub fn sentence(&self, helpers: &[String]) -> Option<String> {
         let each = helpers
             .iter()
-            .filter_map(|h| Some(format!("{}: {}", title(h), self.grants(h)?.join(", "))));
+            .filter_map(|h| Some(format!("{}: {}", self.name(h), self.grants(h)?.join(", "))));
         let all: Vec<String> = each.chain(self.partner()).collect();
         (!all.is_empty()).then(|| format!("Granted: {}.", all.join("; ")))
     }
@@ -171,7 +181,6 @@ const EXTERNAL_TITLES: [(&str, &str); 9] = [
     ("rl", "RL"),
     ("rl_paper", "RL, paper's recipe"),
     ("smart_help", "Smart-Help"),
-    // Without "BM": our behavior models do not detect failures, unlike the paper's.
     ("llm", "LLM"),
     ("llm-told", "LLM, told"),
     ("vlm", "VLM"),

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use chaic_core::TaskId;
 
 use crate::metrics::{Difference, Interval, Metric, RunResult, Score, Scores, resolution};
-use crate::report::labels::{Labels, title};
+use crate::report::labels::Labels;
 use crate::report::text_table::TextTable;
 
 /// Text of an undefined value, as in the paper.
@@ -144,11 +144,16 @@ pub fn resolutions(differences: &[Difference], tasks: &[TaskId]) -> Option<TextT
 
 /// Builds the table of TR differences between helpers, with 95 % intervals; `granted` describes the
 /// grants of the helpers.
-pub fn pairs(differences: &[Difference], tasks: &[TaskId], granted: Option<&str>) -> TextTable {
+pub fn pairs(
+    differences: &[Difference],
+    tasks: &[TaskId],
+    labels: Labels<'_>,
+    granted: Option<&str>,
+) -> TextTable {
     let header = ["TR difference".to_owned(), "all".to_owned()].into_iter();
     let header = header.chain(tasks.iter().map(|t| t.info().title.to_owned()));
     let row = |d: &Difference| {
-        let name = format!("{} - {}", title(&d.helper), title(&d.baseline));
+        let name = format!("{} - {}", labels.name(&d.helper), labels.name(&d.baseline));
         let cells = tasks.iter().map(|t| interval(d.tasks.get(t)));
         [name, interval(d.all.as_ref())].into_iter().chain(cells).collect()
     };

@@ -182,10 +182,21 @@ fn grants_are_in_every_format() {
 }
 
 #[test]
-fn titles_of_language_helpers_do_not_claim_a_behavior_model() {
-    for helper in ["llm", "llm-told"] {
-        assert!(!title(helper).contains("BM"), "no behavior model detects failures");
+fn language_helpers_with_a_behavior_network_are_named_as_in_the_paper() {
+    let behavior = |perception: &str| {
+        let helpers = ["llm", "vlm", "rhp"].map(|name| (name.to_owned(), perception.to_owned()));
+        RunGrants { perception: helpers.into(), ..granted(Grants::NONE) }
+    };
+    for (perception, expected) in [
+        ("ground_truth, behavior learned 0123", ["LLM+BM", "VLM+BM", "RHP"]),
+        ("learned 4567, behavior learned 0123", ["LLM+BM", "VLM+BM", "RHP"]),
+        ("learned 4567", ["LLM", "VLM", "RHP"]),
+    ] {
+        let granted = behavior(perception);
+        let labels = Labels { granted: Some(&granted) };
+        assert_eq!(["llm", "vlm", "rhp"].map(|helper| labels.name(helper)), expected);
     }
+    assert_eq!(Labels { granted: None }.name("llm"), "LLM");
 }
 
 #[test]

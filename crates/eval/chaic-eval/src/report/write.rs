@@ -164,7 +164,7 @@ impl Report<'_> {
         let mut tables = self.tables(&scores);
         tables.push(intervals(&scores, self.labels()));
         if !differences.is_empty() {
-            tables.push(pairs(&differences, &scores.tasks(), granted.as_deref()));
+            tables.push(pairs(&differences, &scores.tasks(), self.labels(), granted.as_deref()));
         }
         tables.extend(resolutions(&differences, &scores.tasks()));
         tables.extend(diagnostics(&scores, self.labels()));

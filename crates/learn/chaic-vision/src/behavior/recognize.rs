@@ -187,7 +187,7 @@ impl LearnedBehavior {
         }
     }
 
-    /// Returns the movable object nearest to a position.
+    /// Returns the movable object nearest to a position that nobody holds.
     fn nearest<'a>(&self, memory: &'a Memory, at: Vec3) -> Option<&'a MappedObject> {
         let is_held =
             |object: &MappedObject| memory.hands.all().any(|(track, _)| track == object.track);
@@ -195,6 +195,7 @@ impl LearnedBehavior {
             object.is_present
                 && !object.is_gone
                 && object.class.info().is_movable()
+                && object.held_until <= memory.frame
                 && !is_held(object)
         });
         self.nearest_among(movable, to_xz(at))

@@ -282,6 +282,7 @@ mod tests {
         let detection = |track: TrackId, class: &str, at: [f32; 3]| Detection {
             track,
             class: ClassId::named(class),
+            confidence: 1.0,
             person: u16::try_from(track.0).ok().and_then(|e| EntityId(e).agent()),
             pixel: [0, 0],
             position_in_world: at.into(),

@@ -17,6 +17,8 @@ pub struct Detection {
     pub track: TrackId,
     /// Class of the object.
     pub class: ClassId,
+    /// Probability that the object exists and has this class.
+    pub confidence: f32,
     /// The person's agent id, for people.
     pub person: Option<AgentId>,
     /// Column and row of a pixel that shows it.
@@ -34,7 +36,7 @@ pub struct Detection {
 }
 
 impl Detection {
-    /// Creates a detection from a measured segment.
+    /// Creates a certain detection from a measured segment.
     pub fn new(
         track: TrackId,
         class: ClassId,
@@ -46,6 +48,7 @@ impl Detection {
         Detection {
             track,
             class,
+            confidence: 1.0,
             person,
             pixel,
             position_in_world,

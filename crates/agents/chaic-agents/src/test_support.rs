@@ -513,6 +513,7 @@ pub fn seen(track: TrackId, class: &str, at: [f32; 3], width_m: f32, height_m: f
     Detection {
         track,
         class: ClassId::named(class),
+        confidence: 1.0,
         person: u16::try_from(track.0).ok().and_then(|e| EntityId(e).agent()),
         pixel: [0, 0],
         position_in_world: Vec3::from(at) + Vec3::new(0.0, 0.5 * height_m, 0.0),

@@ -38,7 +38,7 @@ pub use self::opponent::{CollectOpponentArguments, OpponentArguments, WindowArgu
 pub use self::perception::{
     AppearanceArgument, BehaviorArguments, ClipArguments, CollectBehaviorArguments, CollectCommand,
     CollectDetectionArguments, DetectionArguments, PerceptionEvaluation, SceneSelection,
-    TrainArguments, TrainCommand,
+    TracksArguments, TrainArguments, TrainCommand,
 };
 pub use self::runs::{
     ExplainArguments, MergeArguments, RenderArguments, ReplayArguments, ReportArguments,

@@ -90,6 +90,9 @@ fn run_command(command: Command, format: OutputFormat, launcher: &Launcher) -> R
             Some(ModelEvaluation::Behavior(arguments)) => {
                 commands::perception::evaluate_behavior(arguments, format)
             }
+            Some(ModelEvaluation::Tracks(arguments)) => {
+                commands::perception::evaluate_tracks_of(arguments, format)
+            }
             Some(ModelEvaluation::Opponent(arguments)) => {
                 commands::opponent::evaluate(arguments, format)
             }

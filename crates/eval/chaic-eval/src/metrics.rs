@@ -17,7 +17,7 @@ mod tally;
 
 pub use accumulators::MetricAccumulator;
 pub use cluster::{Clusters, Environments, Interval};
-pub use differences::{Difference, Resolution, differences, resolution};
+pub use differences::{Difference, Resolution, differences, resolution, run_differences};
 pub use formulas::{FormulaSet, Formulas, Spread};
 pub use result::{Delivery, RunResult, RunStatus, Summary};
 pub use score::{MAX_NAMED, Score};

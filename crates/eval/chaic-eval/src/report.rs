@@ -11,7 +11,7 @@ pub use coverage::{coverage, untraced_note};
 pub use figure::write_figure;
 pub use labels::{GrantsFile, Labels, title};
 pub use tables::{
-    additional, counts, diagnostics, intervals, main_result, pairs, resolutions, stuck,
+    additional, counts, diagnostics, intervals, main_result, pairs, resolutions, run_pairs, stuck,
 };
 pub use tables::{capitalized, interval, number, rounded, shown_interval};
 pub use text_table::TextTable;

@@ -12,7 +12,7 @@
 //! - Evaluation: [`average_precision`], [`error_breakdown`] (errors by cause), [`evaluate`].
 //! - Perception for agents: [`tracker`], [`perception`] (detector and tracker), [`noisy`] (ground
 //!   truth with simulated errors), [`behavior`] (action recognition), [`perception_registry`] (all
-//!   of them by name).
+//!   of them by name), [`track_evaluation`] (accuracy of tracks over whole episodes).
 //!
 //! **What it is not**: it knows no goals, rules or policies.
 //!
@@ -54,6 +54,8 @@ pub mod noisy;
 pub mod perception;
 pub mod perception_registry;
 pub mod tracker;
+
+pub mod track_evaluation;
 
 pub mod behavior;
 

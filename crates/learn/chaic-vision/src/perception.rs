@@ -1,5 +1,6 @@
 //! Perception by the learned detector: from color and depth to tracked objects.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use chaic_agents::perception::{Perception, Percepts, PixelKind, STRIDE, Segments};
@@ -7,9 +8,11 @@ use chaic_agents::perception_factory::PerceptionFactory;
 use chaic_agents::track::{Hands, Intent, TrackId};
 use chaic_core::geom::Camera;
 use chaic_core::observation::{Grants, SensorConfig};
-use chaic_core::{Briefing, Observation, Outcome, Target};
+use chaic_core::{Briefing, ClassId, EntityId, Observation, Outcome, Target};
 
 use crate::instances::Instance;
+use crate::labels::label_of;
+use crate::perception_registry::GT_NAMES;
 use crate::tracker::{Measurement, Tracker, TrackerConfig};
 use crate::trained::{DetectorInference, TrainedDetector};
 
@@ -17,29 +20,37 @@ use crate::trained::{DetectorInference, TrainedDetector};
 #[derive(Clone, Debug)]
 pub struct LearnedPerceptionFactory {
     detector: Arc<TrainedDetector>,
-    digest: String,
+    name: String,
+    has_true_names: bool,
 }
 
 impl LearnedPerceptionFactory {
     /// Creates the factory for one detector.
     pub fn new(detector: TrainedDetector) -> LearnedPerceptionFactory {
-        let digest = detector.digest();
-        LearnedPerceptionFactory { detector: Arc::new(detector), digest }
+        let name = format!("learned {}", detector.digest());
+        LearnedPerceptionFactory { detector: Arc::new(detector), name, has_true_names: false }
+    }
+
+    /// Creates a factory that replaces the names of detections by the class of the object that most
+    /// of their pixels show, and drops detections of structure. It measures what wrong names cost.
+    pub fn with_true_names(detector: TrainedDetector) -> LearnedPerceptionFactory {
+        let name = format!("{GT_NAMES} {}", detector.digest());
+        LearnedPerceptionFactory { detector: Arc::new(detector), name, has_true_names: true }
     }
 }
 
 impl PerceptionFactory for LearnedPerceptionFactory {
     fn name(&self) -> Option<String> {
-        Some(format!("learned {}", self.digest))
+        Some(self.name.clone())
     }
 
     fn sensors(&self) -> SensorConfig {
-        SensorConfig { rgb: true, ids: false, ..SensorConfig::DEPTH_AND_IDS }
+        SensorConfig { rgb: true, ids: self.has_true_names, ..SensorConfig::DEPTH_AND_IDS }
     }
 
     fn grants(&self, requested: Grants) -> Grants {
         // The granted state names objects by ids, which this perception cannot match to its tracks.
-        Grants { ids: false, state: false, ..requested }
+        Grants { ids: requested.ids && self.has_true_names, state: false, ..requested }
     }
 
     fn perception(&self) -> Box<dyn Perception> {
@@ -47,6 +58,7 @@ impl PerceptionFactory for LearnedPerceptionFactory {
         Box::new(LearnedPerception {
             detector: Arc::clone(&self.detector),
             inference,
+            has_true_names: self.has_true_names,
             tracking: Tracking::default(),
         })
     }
@@ -57,6 +69,7 @@ impl PerceptionFactory for LearnedPerceptionFactory {
 struct LearnedPerception {
     detector: Arc<TrainedDetector>,
     inference: DetectorInference,
+    has_true_names: bool,
     tracking: Tracking,
 }
 
@@ -80,7 +93,11 @@ impl Perception for LearnedPerception {
         if !self.detector.fits(camera) || rgb.len() != 3 * n_pixels || depth_m.len() != n_pixels {
             return Percepts::default();
         }
-        let instances = self.detector.detect(rgb, depth_m, camera, &mut self.inference);
+        let mut instances = self.detector.detect(rgb, depth_m, camera, &mut self.inference);
+        if self.has_true_names {
+            let ids = images.ids.as_deref().unwrap_or_default();
+            instances = with_true_names(instances, ids, |id| observation.granted.class_of(id));
+        }
         self.tracking.update(&instances, depth_m, observation)
     }
 
@@ -92,9 +109,32 @@ impl Perception for LearnedPerception {
         true
     }
 
+    fn hides_ids(&self) -> bool {
+        self.has_true_names
+    }
+
     fn fork(&self) -> Box<dyn Perception> {
         Box::new(self.clone())
     }
+}
+
+/// Names each instance by the class of the object that most of its pixels show, in an image of ids;
+/// drops instances of structure. Scores stay as they are.
+fn with_true_names(
+    instances: Vec<Instance>,
+    ids: &[u16],
+    class_of: impl Fn(EntityId) -> Option<ClassId>,
+) -> Vec<Instance> {
+    let named = instances.into_iter().filter_map(|instance| {
+        let mut counts: BTreeMap<u16, usize> = BTreeMap::new();
+        for id in instance.pixels.iter().filter_map(|pixel| ids.get(*pixel as usize)) {
+            *counts.entry(*id).or_default() += 1;
+        }
+        let (id, _) = counts.into_iter().max_by_key(|(_, n)| *n)?;
+        let label = label_of(Some(class_of(EntityId(id))?));
+        Some(Instance { names: vec![(label, instance.score())], ..instance })
+    });
+    named.collect()
 }
 
 /// Tracks the detections of successive images.
@@ -159,11 +199,30 @@ fn measure(
     let mut measurements = Vec::new();
     for (k, (instance, extent)) in instances.iter().zip(extents.into_iter().skip(1)).enumerate() {
         if let Some(extent) = extent {
-            let (label, score) = (instance.label(), instance.score());
-            measurements.push(Measurement { label, score, extent });
+            measurements.push(Measurement { names: instance.names.clone(), extent });
             segment_numbers[k + 1] = measurements.len() as u16;
         }
     }
     segment_ids.iter_mut().for_each(|segment| *segment = segment_numbers[usize::from(*segment)]);
     (segment_ids, measurements)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn true_names_are_those_of_most_pixels() {
+        let instance = |pixels: &[u32]| Instance {
+            names: vec![(label_of(Some(ClassId::named("banana"))), 0.7)],
+            pixels: pixels.to_vec(),
+            center: [0.0; 3],
+        };
+        let ids = [0, 0, 7, 7, 7, 0];
+        let class_of = |id: EntityId| (id.0 == 7).then(|| ClassId::named("apple"));
+        let named =
+            with_true_names(vec![instance(&[1, 2, 3]), instance(&[0, 1, 4])], &ids, class_of);
+        let apple = vec![(label_of(Some(ClassId::named("apple"))), 0.7)];
+        assert_eq!(named, [Instance { names: apple, ..instance(&[1, 2, 3]) }]);
+    }
 }

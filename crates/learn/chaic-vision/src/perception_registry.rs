@@ -21,6 +21,12 @@ pub const LEARNED: &str = "learned";
 /// rates.
 pub const NOISY: &str = "noisy";
 
+/// Name of the learned detector with ground-truth classes; `gt_names:FILE` reads other weights. With
+/// [`GT_MASKS`] it measures what errors of the detector's parts cost.
+pub const GT_NAMES: &str = "gt_names";
+/// Name of ground-truth masks and classes with learned tracks.
+pub const GT_MASKS: &str = "gt_masks";
+
 /// Maximum size of a file of weights or rates, bytes.
 const MAX_BYTES: u64 = 1 << 28;
 
@@ -53,7 +59,12 @@ pub enum PerceptionError {
 
 /// Returns the weights file of a name such as `learned:FILE`.
 pub fn weights_of(name: &str) -> Option<&Path> {
-    name.strip_prefix(LEARNED)?.strip_prefix(':').map(Path::new)
+    file_of(name, LEARNED)
+}
+
+/// Returns the file of a name such as `KIND:FILE`.
+fn file_of<'a>(name: &'a str, kind: &str) -> Option<&'a Path> {
+    name.strip_prefix(kind)?.strip_prefix(':').map(Path::new)
 }
 
 /// Reads a detector from a file.
@@ -106,23 +117,38 @@ fn factory_from_name(name: &str) -> Result<Arc<dyn PerceptionFactory>, Perceptio
     if let Some(file) = weights_of(name) {
         return Ok(Arc::new(LearnedPerceptionFactory::new(read_detector(file)?)));
     }
+    if name == GT_NAMES {
+        let detector = TrainedDetector::built_in();
+        return Ok(Arc::new(LearnedPerceptionFactory::with_true_names(detector)));
+    }
+    if let Some(file) = file_of(name, GT_NAMES) {
+        let detector = read_detector(file)?;
+        return Ok(Arc::new(LearnedPerceptionFactory::with_true_names(detector)));
+    }
+    if name == GT_MASKS {
+        let noise = DetectorNoiseModel::none();
+        return Ok(Arc::new(NoisyPerceptionFactory::new(noise, GT_MASKS.to_owned())));
+    }
     if name == NOISY {
         return Ok(Arc::new(NoisyPerceptionFactory::new(
             DetectorNoiseModel::built_in(),
             NOISY.to_owned(),
         )));
     }
-    if let Some(file) = name.strip_prefix(NOISY).and_then(|suffix| suffix.strip_prefix(':')) {
-        let path = Path::new(file);
+    if let Some(path) = file_of(name, NOISY) {
         let rates_error = |e: serde_json::Error| PerceptionError::Rates {
             path: path.to_owned(),
             problem: e.to_string(),
         };
         let rates: DetectorNoiseModel =
             serde_json::from_slice(&read_user_file(path, MAX_BYTES)?).map_err(rates_error)?;
-        return Ok(Arc::new(NoisyPerceptionFactory::new(rates, format!("{NOISY} {file}"))));
+        return Ok(Arc::new(NoisyPerceptionFactory::new(
+            rates,
+            format!("{NOISY} {}", path.display()),
+        )));
     }
     Err(PerceptionError::Unknown(format!(
-        "no perception `{name}`; write {GROUND_TRUTH}, {LEARNED}, {LEARNED}:FILE, {NOISY} or {NOISY}:FILE"
+        "no perception `{name}`; write {GROUND_TRUTH}, {GT_MASKS}, {GT_NAMES}, {LEARNED}, {LEARNED}:FILE, \
+         {NOISY} or {NOISY}:FILE"
     )))
 }

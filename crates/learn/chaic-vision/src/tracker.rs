@@ -4,6 +4,8 @@
 //! carried object may have moved by walking speed; a released object lies near the agent. The agent
 //! knows its own held objects from proprioception: they are no detections.
 
+mod plan_extent;
+
 use std::collections::BTreeMap;
 
 use chaic_agents::perception::{Detection, PixelKind, SegmentMeasurement};
@@ -12,7 +14,16 @@ use chaic_core::briefing::{Companion, CompanionRole};
 use chaic_core::geom::{Camera, Pose, horizontal_distance, rotate_yaw};
 use chaic_core::{Action, AgentId, Briefing, ClassId, EntityId, Frame, Hand, Outcome, Vec2, Vec3};
 
-use crate::labels::class_of;
+use self::plan_extent::PlanExtent;
+use crate::labels::{class_of, n_labels};
+use crate::loss::{exp, ln, sigmoid};
+
+/// Probability of each label that a detection does not name.
+const UNNAMED: f32 = 0.001;
+/// A detection whose label agrees with that of a track with a lower probability has another label.
+const MIN_AGREEMENT: f32 = 0.02;
+/// Cost of a match between labels that certainly differ, relative to the maximum displacement.
+const DISAGREEMENT_COST: f32 = 0.5;
 
 /// Thresholds of the tracker. Lengths in meters.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,11 +44,16 @@ pub struct TrackerConfig {
     pub report_log_odds: f32,
     /// Maximum displacement of small static objects.
     pub max_static_m: f32,
-    /// Maximum displacement of large static objects, relative to their largest horizontal extent.
-    /// Other parts of them are visible from elsewhere.
-    pub max_static_extents: f32,
-    /// Maximum displacement if the detected class changes.
+    /// Maximum diameter of all visible points of a large static object from above, relative to the
+    /// diagonal of its class.
+    pub max_diameter: f32,
+    /// Tolerance of that diameter: points from above are 0.125 m apart.
+    pub diameter_tolerance_m: f32,
+    /// Maximum displacement if detection and track have no label in common.
     pub max_relabeled_m: f32,
+    /// Factor of the class evidence of a track at each new detection: successive images are similar,
+    /// so their errors are not independent.
+    pub evidence_decay: f32,
     /// Maximum displacement of carried objects per frame.
     pub carried_m_per_frame: f32,
     /// Maximum displacement of carried objects in total.
@@ -63,10 +79,12 @@ impl Default for TrackerConfig {
             log_odds_range: [-1.5, 4.0],
             report_log_odds: 0.3,
             max_static_m: 0.4,
-            max_static_extents: 0.6,
+            max_diameter: 1.05,
+            diameter_tolerance_m: 0.2,
             max_relabeled_m: 0.15,
+            evidence_decay: 0.9,
             carried_m_per_frame: 0.04,
-            max_carried_m: 3.0,
+            max_carried_m: 6.0,
             max_released_m: 1.9,
             fragment_extents: 0.35,
         }
@@ -76,22 +94,43 @@ impl Default for TrackerConfig {
 /// Detection before association.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measurement {
-    /// Label, never the background.
-    pub label: u8,
-    /// Score, 0 to 1.
-    pub score: f32,
+    /// Possible labels, never the background, with their scores from 0 to 1 in descending order.
+    /// There is at least one.
+    pub names: Vec<(u8, f32)>,
     /// Position and size.
     pub extent: SegmentMeasurement,
+}
+
+impl Measurement {
+    /// The most probable label.
+    pub fn label(&self) -> u8 {
+        self.names[0].0
+    }
+
+    /// Probability that there is an object of one of these labels.
+    pub fn score(&self) -> f32 {
+        self.names.iter().map(|(_, score)| score).sum::<f32>().min(1.0)
+    }
+
+    /// Probability of a label, given that there is an object of one of these labels.
+    fn probability(&self, label: u8) -> f32 {
+        let total: f32 = self.names.iter().map(|(_, score)| score).sum();
+        let named = self.names.iter().filter(|(l, _)| *l == label);
+        named.map(|(_, score)| score / total.max(f32::MIN_POSITIVE)).sum()
+    }
 }
 
 /// Tracked object.
 #[derive(Clone, Debug)]
 struct Track {
     id: TrackId,
-    /// Accumulated evidence for each label.
+    /// Log likelihood of each label relative to labels that were never detected.
     evidence: BTreeMap<u8, f32>,
+    /// The most probable label.
     label: u8,
     position: Vec3,
+    /// Extent of all its points since it moved last; `None` for small objects.
+    extent: Option<PlanExtent>,
     last_seen: Frame,
     /// Log odds that the object exists.
     log_odds: f32,
@@ -143,7 +182,8 @@ impl Tracker {
         camera: &Camera,
     ) -> (Vec<Detection>, Vec<PixelKind>) {
         self.release(now, pose);
-        let mut kinds: Vec<PixelKind> = measurements.iter().map(|s| pixel_kind(s.label)).collect();
+        let mut kinds: Vec<PixelKind> =
+            measurements.iter().map(|s| pixel_kind(s.label())).collect();
         let held_boxes = self.held_boxes();
         for (kind, measurement) in kinds.iter_mut().zip(measurements) {
             if is_within(&held_boxes, measurement.extent.position_in_world, pose) {
@@ -151,7 +191,7 @@ impl Tracker {
             }
         }
         let is_candidate = |k: &usize| {
-            kinds[*k] != PixelKind::Carried && measurements[*k].score >= self.config.min_score
+            kinds[*k] != PixelKind::Carried && measurements[*k].score() >= self.config.min_score
         };
         let (people, objects): (Vec<usize>, Vec<usize>) = (0..measurements.len())
             .filter(is_candidate)
@@ -207,6 +247,8 @@ impl Tracker {
     fn held_boxes(&self) -> Vec<(Vec3, Vec3)> {
         /// Margin around the extents of the class, meters.
         const MARGIN_M: f32 = 0.1;
+        /// Height of the contents above the center of their container, meters.
+        const CONTENTS_M: f32 = 0.4;
         /// Half extent of an unknown object, meters.
         const UNKNOWN_M: f32 = 0.25;
         let half = |class: Option<ClassId>| {
@@ -225,7 +267,10 @@ impl Tracker {
             let held = self.hands.hands[hand.index()].as_ref()?;
             let side = if hand == Hand::Left { -1.0 } else { 1.0 };
             // Position of held objects, relative to the body's height.
-            Some((Vec3::new(side * 0.2, 0.57 * height_m, -0.31 * height_m), half(held.class())))
+            let center = Vec3::new(side * 0.2, 0.57 * height_m, -0.31 * height_m);
+            // Contents stand out of their container.
+            let above_m = if held.n_contents > 0 { 0.5 * CONTENTS_M } else { 0.0 };
+            Some((center + above_m * Vec3::Y, half(held.class()) + above_m * Vec3::Y))
         };
         Hand::BOTH.into_iter().filter_map(in_hand).collect()
     }
@@ -305,7 +350,7 @@ impl Tracker {
             let distance_m = horizontal_distance(*at, extent.position_in_world);
             (distance_m - carried_m_per_frame * (now - frame) as f32).clamp(0.0, max_carried_m)
         });
-        height_cost + displacement_m - measurement.score
+        height_cost + displacement_m - measurement.score()
     }
 
     fn match_objects(
@@ -347,7 +392,8 @@ impl Tracker {
             track.update(measurement, carried[k], now, &config);
             let is_reported = track.log_odds > config.report_log_odds;
             if let Some(class) = class_of(track.label).filter(|_| is_reported) {
-                found.push(Detection::new(track.id, class, None, measurement.extent.clone()));
+                let detection = Detection::new(track.id, class, None, measurement.extent.clone());
+                found.push(Detection { confidence: track.confidence(), ..detection });
             }
         }
         found
@@ -369,14 +415,13 @@ impl Tracker {
     ) -> Option<f32> {
         let config = &self.config;
         let distance_m = track.position.distance(measurement.extent.position_in_world);
-        if track.label != measurement.label {
-            let is_same_kind = pixel_kind(track.label) == pixel_kind(measurement.label);
+        let agreement = track.agreement(measurement);
+        if agreement < MIN_AGREEMENT {
+            let is_same_kind = pixel_kind(track.label) == pixel_kind(measurement.label());
             return (is_same_kind && distance_m < config.max_relabeled_m)
                 .then_some(1.0 + distance_m);
         }
-        let extents = extents_m(track.label);
-        let max_static_m =
-            config.max_static_m.max(config.max_static_extents * extents[0].max(extents[2]));
+        let max_static_m = config.max_static_m;
         let TrackerConfig { carried_m_per_frame, max_carried_m, .. } = *config;
         if track.is_released {
             // The object may have fallen.
@@ -386,27 +431,45 @@ impl Tracker {
         }
         let max_walk_m = max_static_m + carried_m_per_frame * (now - track.last_seen) as f32;
         let may_be_carried = track.is_carried || in_hand;
-        let max_m = if may_be_carried { max_walk_m.min(max_carried_m) } else { max_static_m };
-        // Among the tracks within reach, the one with the smallest displacement matches first.
-        (distance_m < max_m).then_some(distance_m / max_static_m)
+        let similarity_cost = DISAGREEMENT_COST * (1.0 - agreement);
+        if !may_be_carried && let Some(extent) = &track.extent {
+            let seen = PlanExtent::new(&measurement.extent.footprint)?;
+            let distance_m = extent.center().distance(seen.center());
+            let is_same = config.is_one_object(track.label, extent, &seen);
+            return is_same.then_some(distance_m / max_static_m + similarity_cost);
+        }
+        let max_m = match may_be_carried {
+            // A person carries it along.
+            true if track.is_carried && in_hand => max_walk_m,
+            true => max_walk_m.min(max_carried_m),
+            false => max_static_m,
+        };
+        // Among the tracks within reach, the one with the smallest displacement and the most similar
+        // labels matches first.
+        (distance_m < max_m).then_some(distance_m / max_static_m + similarity_cost)
     }
 
     /// True if a detection is a part of an object that was just seen.
     fn is_fragment(&self, measurement: &Measurement, now: Frame) -> bool {
-        let size_m = extents_m(measurement.label).into_iter().fold(0.0, f32::max);
+        let label = measurement.label();
+        let size_m = extents_m(label).into_iter().fold(0.0, f32::max);
         let near_m = self.config.fragment_extents * size_m;
         let at = measurement.extent.position_in_world;
-        let mut same =
-            self.tracks.iter().filter(|t| t.last_seen == now && t.label == measurement.label);
-        same.any(|t| t.position.distance(at) < near_m)
+        let seen = large_extent(label, measurement);
+        let mut same = self.tracks.iter().filter(|t| t.last_seen == now && t.label == label);
+        same.any(|track| match track.extent.as_ref().zip(seen.as_ref()) {
+            Some((extent, seen)) => self.config.is_one_object(label, extent, seen),
+            None => track.position.distance(at) < near_m,
+        })
     }
 
     fn start_track(&mut self, measurement: &Measurement, now: Frame) -> usize {
         self.tracks.push(Track {
             id: TrackId(TrackId::FIRST_OWN.0 + self.tracks.len() as u32),
             evidence: BTreeMap::new(),
-            label: measurement.label,
+            label: measurement.label(),
             position: measurement.extent.position_in_world,
+            extent: None,
             last_seen: now,
             log_odds: 0.0,
             is_carried: false,
@@ -417,6 +480,27 @@ impl Tracker {
 }
 
 impl Track {
+    /// Probability of a label, given that the object exists.
+    fn probability(&self, label: u8) -> f32 {
+        let evidence = self.evidence.get(&label).copied().unwrap_or(0.0);
+        let max = self.evidence.values().copied().fold(0.0, f32::max);
+        let n_other = (n_labels() - 1).saturating_sub(self.evidence.len()) as f32;
+        let sum: f32 = self.evidence.values().map(|evidence| exp(evidence - max)).sum();
+        exp(evidence - max) / (sum + n_other * exp(-max))
+    }
+
+    /// Probability that track and detection have the same label.
+    fn agreement(&self, measurement: &Measurement) -> f32 {
+        let shared =
+            |(label, _): &(u8, f32)| self.probability(*label) * measurement.probability(*label);
+        measurement.names.iter().map(shared).sum()
+    }
+
+    /// Probability that the object exists and has its label.
+    fn confidence(&self) -> f32 {
+        sigmoid(self.log_odds) * self.probability(self.label)
+    }
+
     fn update(
         &mut self,
         measurement: &Measurement,
@@ -425,21 +509,47 @@ impl Track {
         config: &TrackerConfig,
     ) {
         let [low, high] = config.log_odds_range;
+        let score = measurement.score();
         self.log_odds = match self.evidence.is_empty() {
-            true => config.birth_log_odds * (measurement.score - config.birth_score),
-            false => self.log_odds + config.hit_log_odds * measurement.score,
+            true => config.birth_log_odds * (score - config.birth_score),
+            false => self.log_odds + config.hit_log_odds * score,
         };
         self.log_odds = self.log_odds.clamp(low, high);
-        // Larger detections count more.
-        let n_pixels = measurement.extent.n_pixels.min(2000) as f32;
-        *self.evidence.entry(measurement.label).or_default() += measurement.score * n_pixels.sqrt();
-        let strongest = self.evidence.iter().fold((0.0, self.label), |best, (label, weight)| {
-            if *weight > best.0 { (*weight, *label) } else { best }
+        self.evidence.values_mut().for_each(|evidence| *evidence *= config.evidence_decay);
+        for (label, _) in &measurement.names {
+            let ratio = measurement.probability(*label).max(UNNAMED) / UNNAMED;
+            *self.evidence.entry(*label).or_default() += score * ln(ratio);
+        }
+        let strongest = self.evidence.iter().fold((0.0, self.label), |best, (label, evidence)| {
+            if *evidence > best.0 { (*evidence, *label) } else { best }
         });
         self.label = strongest.1;
         self.position = measurement.extent.position_in_world;
+        let seen = large_extent(self.label, measurement);
+        let has_moved = self.is_carried || self.is_released || is_carried;
+        self.extent = match (&self.extent, seen) {
+            (Some(extent), Some(seen)) if !has_moved => Some(extent.union(&seen)),
+            (_, seen) => seen,
+        };
         (self.last_seen, self.is_carried, self.is_released) = (now, is_carried, false);
     }
+}
+
+impl TrackerConfig {
+    /// Returns whether two extents can belong to one object. Some objects are larger than their
+    /// class; the larger extent shows it.
+    fn is_one_object(&self, label: u8, a: &PlanExtent, b: &PlanExtent) -> bool {
+        let [x, _, z] = extents_m(label);
+        let max_m = self.max_diameter * (x * x + z * z).sqrt();
+        let max_m = max_m.max(a.diameter_m()).max(b.diameter_m());
+        a.union(b).diameter_m() < max_m + self.diameter_tolerance_m
+    }
+}
+
+/// Extent from above of a detection; `None` for small objects.
+fn large_extent(label: u8, measurement: &Measurement) -> Option<PlanExtent> {
+    let is_large = !matches!(pixel_kind(label), PixelKind::Small | PixelKind::Person);
+    is_large.then(|| PlanExtent::new(&measurement.extent.footprint)).flatten()
 }
 
 fn pixel_kind(label: u8) -> PixelKind {

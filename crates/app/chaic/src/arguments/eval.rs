@@ -10,7 +10,9 @@ use chaic_eval::run::Shard;
 use clap::{Args, Subcommand};
 
 use super::exec::{ExecArguments, HelperArgument, HelperList, helpers};
-use super::{BehaviorArguments, DetectionArguments, OpponentArguments, Tasks, ranges, tasks};
+use super::{
+    BehaviorArguments, DetectionArguments, OpponentArguments, Tasks, TracksArguments, ranges, tasks,
+};
 
 /// `chaic eval` with or without a subcommand.
 #[derive(Args, Debug)]
@@ -30,6 +32,8 @@ pub enum ModelEvaluation {
     Detection(DetectionArguments),
     /// Evaluate the behavior network: accuracy, confusion matrix, calibration.
     Behavior(BehaviorArguments),
+    /// Evaluate the tracks of a perception: objects that a helper detects and remembers.
+    Tracks(TracksArguments),
     /// Evaluate an opponent model: accuracy of goals and limits.
     Opponent(OpponentArguments),
 }
@@ -86,7 +90,7 @@ pub struct EvalArguments {
     #[arg(long, value_name = "NAME")]
     pub track: Option<Track>,
     /// Object detection of helpers: gt (ids from ground truth), learned (the built-in detector),
-    /// learned:FILE, noisy or noisy:FILE [default: gt].
+    /// noisy, gt_names (each also as NAME:FILE) or gt_masks; docs/perception.md [default: gt].
     #[arg(long, value_name = "KIND")]
     pub perception: Option<String>,
     /// Behavior recognition of helpers: gt (granted state and held objects), learned (the built-in network)

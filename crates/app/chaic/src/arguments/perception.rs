@@ -1,4 +1,4 @@
-//! Options of `chaic collect`, `chaic train`, `chaic eval detection` and `chaic eval behavior`.
+//! Options of `chaic collect`, `chaic train`, and `chaic eval detection|behavior|tracks`.
 
 use std::path::PathBuf;
 
@@ -190,4 +190,22 @@ pub struct BehaviorArguments {
     /// Also write all metrics to a JSON file.
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
+}
+
+/// `chaic eval tracks`.
+#[derive(Args, Debug)]
+pub struct TracksArguments {
+    /// Evaluated perception: learned, noisy, gt_names (each also as NAME:FILE) or gt_masks.
+    #[arg(long, value_name = "KIND", default_value = "learned")]
+    pub perception: String,
+    /// Number of episodes; tasks take turns, 1 to 100000.
+    #[arg(long, value_name = "N", default_value_t = 32)]
+    #[arg(value_parser = clap::value_parser!(u32).range(ranges::EPISODES))]
+    pub n_episodes: u32,
+    /// Also write all metrics to a JSON file.
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+    /// Episodes in parallel, 1 to 1024; does not change the metrics [default: one per core].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(ranges::JOBS))]
+    pub jobs: Option<u16>,
 }

@@ -41,6 +41,9 @@ pub struct ReportArguments {
     /// Print what each helper loses against oracle_plan, by cause; docs/metrics.md.
     #[arg(long, conflicts_with_all = ["formulas", "belief", "figure"])]
     pub losses: bool,
+    /// Print the differences of TR to another run on the same episodes, for each helper of both.
+    #[arg(long, value_name = "RUN", conflicts_with_all = ["formulas", "belief", "figure", "losses"])]
+    pub baseline: Option<PathBuf>,
 }
 
 /// `chaic show`.

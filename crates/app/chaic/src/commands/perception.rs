@@ -1,4 +1,4 @@
-//! `chaic eval detection` and `chaic eval behavior`.
+//! `chaic eval detection`, `chaic eval behavior` and `chaic eval tracks`.
 
 use std::fs;
 
@@ -12,12 +12,13 @@ use chaic_vision::coco::{ANNOTATIONS, DETECTIONS, annotate, annotations_json, re
 use chaic_vision::evaluate::{DetectionReport, MIN_AREA_PX, MIN_FREQUENT_INSTANCES, report};
 use chaic_vision::instances::Instance;
 use chaic_vision::perception_registry::{read_behavior, read_detector};
+use chaic_vision::track_evaluation::{Rate, TrackReport, evaluate_tracks};
 use chaic_vision::trained::TrainedDetector;
 use chaic_vision::views::LabeledView;
 
 use super::datasets::{collect_clips, view_config};
-use super::{jobs, write_json};
-use crate::arguments::{BehaviorArguments, ClipArguments, DetectionArguments};
+use super::{bars, jobs, run_perception, write_json};
+use crate::arguments::{BehaviorArguments, ClipArguments, DetectionArguments, TracksArguments};
 use crate::exit::ExitStatus;
 use crate::interrupt;
 use crate::output::{OutputFormat, print_result};
@@ -71,6 +72,54 @@ pub fn evaluate_behavior(
     print_result(format, &report, &behavior_text(&report, &arguments.clips))?;
     write_json(arguments.json.as_deref(), &report)?;
     Ok(ExitStatus::Success)
+}
+
+/// Evaluates the tracks of a perception over whole held-out episodes.
+pub fn evaluate_tracks_of(arguments: &TracksArguments, format: OutputFormat) -> Result<ExitStatus> {
+    let perception = run_perception::perception_by_name(Some(&arguments.perception), None)?;
+    let stop = interrupt::stop_flag()?;
+    let bar = bars::count_bar(u64::from(arguments.n_episodes), "episodes");
+    let (n_episodes, n_threads) = (arguments.n_episodes as usize, jobs(arguments.jobs));
+    let progress = || bar.inc(1);
+    let split = DatasetSplit::Test;
+    let report =
+        evaluate_tracks(perception.as_ref(), split, n_episodes, n_threads, &progress, stop);
+    bar.finish_and_clear();
+    let Some(report) = report else { return Ok(ExitStatus::Interrupted) };
+    print_result(format, &report, &tracks_text(&report, &arguments.perception))?;
+    write_json(arguments.json.as_deref(), &report)?;
+    Ok(ExitStatus::Success)
+}
+
+fn tracks_text(report: &TrackReport, perception: &str) -> String {
+    let rate = |r: &Rate| format!("{:.3} +- {:.3} of {}", r.value, r.interval, r.n);
+    let mut text = format!(
+        "{} episodes, {} images, {perception} perception\n\
+         precision of detections     {}\n\
+         recall of visible objects   {}\n",
+        report.episodes,
+        report.images,
+        rate(&report.detection_precision),
+        rate(&report.detection_recall)
+    );
+    for (m, recall) in &report.detection_recall_by_m {
+        text += &format!("  up to {m:2} m                {}\n", rate(recall));
+    }
+    text += &format!(
+        "precision of memory         {}\n\
+         recall of seen objects      {}\n",
+        rate(&report.memory_precision),
+        rate(&report.memory_recall)
+    );
+    for (m, recall) in &report.memory_recall_by_m {
+        text += &format!("  nearest sight up to {m:2} m  {}\n", rate(recall));
+    }
+    text + &format!(
+        "identity switches per object {}\n\
+         calibration error of confidences {:.3}\n",
+        rate(&report.identity_switches),
+        report.calibration_error
+    )
 }
 
 /// Formats the confusion matrix, one row per label, and the scores.

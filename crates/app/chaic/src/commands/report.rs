@@ -1,6 +1,8 @@
 //! `chaic report`.
 
-use anyhow::Result;
+use std::path::Path;
+
+use anyhow::{Context, Result};
 use chaic_eval::EvalError;
 use chaic_eval::calibration::read_scores;
 use chaic_eval::losses::Losses;
@@ -55,10 +57,26 @@ pub fn run(arguments: &ReportArguments, format: OutputFormat) -> Result<ExitStat
         print(&losses.text(format))?;
         return Ok(ExitStatus::Success);
     }
+    if let Some(path) = &arguments.baseline {
+        return report_differences(&report, path, format);
+    }
     match &arguments.figure {
         Some(path) => write_figure(&report.scores(), report.labels(), path)?,
         None => print(&report.text(format))?,
     }
+    Ok(ExitStatus::Success)
+}
+
+/// Prints the differences to the run in another folder.
+fn report_differences(report: &Report<'_>, path: &Path, format: Format) -> Result<ExitStatus> {
+    if !matches!(format, Format::Table | Format::Markdown) {
+        anyhow::bail!("--baseline prints a table; choose --format text or md");
+    }
+    let (folder, options) = RunFolder::read(path)?;
+    let results = from_journal(&folder, &planned(&folder, &options).unwrap_or_default())?;
+    let name = path.display().to_string();
+    let text = report.differences_text(&name, &results, format);
+    print(&text.with_context(|| format!("{name} has no helper with episodes of this run"))?)?;
     Ok(ExitStatus::Success)
 }
 

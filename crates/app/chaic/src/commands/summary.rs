@@ -102,12 +102,7 @@ fn table(scores: &Scores, labels: Labels<'_>, helpers: &[String]) -> Vec<String>
 }
 
 /// Formats the columns of some tasks.
-fn block(
-    scores: &Scores,
-    labels: Labels<'_>,
-    helpers: &[String],
-    tasks: &[TaskId],
-) -> Vec<String> {
+fn block(scores: &Scores, labels: Labels<'_>, helpers: &[String], tasks: &[TaskId]) -> Vec<String> {
     let heads: Vec<[String; 2]> = tasks.iter().map(|task| split_title(task.info().title)).collect();
     let widths: Vec<usize> = heads
         .iter()

@@ -1,13 +1,13 @@
 //! Paired differences of transport rates between helpers, and the resolution of a set of episodes.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use chaic_core::TaskId;
 use chaic_env::helper_registry::NONE;
 
 use crate::metrics::cluster::{Clusters, Interval};
-use crate::metrics::scores::{ByEpisode, grouped, over_played, over_seeds};
-use crate::metrics::{PlayedEpisodes, Summary};
+use crate::metrics::scores::{ByEpisode, Groups, grouped, over_played, over_seeds};
+use crate::metrics::{Environments, PlayedEpisodes, RunResult, Summary};
 
 /// Difference of the transport rates of two helpers on the same episodes.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,27 +44,45 @@ pub fn differences(played: PlayedEpisodes<'_>, helpers: &[String]) -> Vec<Differ
     let mut found = Vec::new();
     for (k, helper) in helpers.iter().enumerate() {
         for baseline in &helpers[..k] {
-            let mut tasks = BTreeMap::new();
-            let mut all = Clusters::default();
-            for (task, by_helper) in &groups {
-                let (Some(a), Some(b)) = (rates(by_helper, helper), rates(by_helper, baseline))
-                else {
-                    continue;
-                };
-                let mut in_task = Clusters::default();
-                for (episode, rate) in a {
-                    let Some(baseline_rate) = b.get(episode) else { continue };
-                    let environment = played.environments.get(episode);
-                    in_task.add(*task, environment, rate - baseline_rate);
-                    all.add(*task, environment, rate - baseline_rate);
-                }
-                tasks.extend(in_task.interval().map(|interval| (*task, interval)));
-            }
-            let (helper, baseline) = (helper.clone(), baseline.clone());
-            found.push(Difference { helper, baseline, tasks, all: all.interval() });
+            found.push(difference((&groups, helper), (&groups, baseline), played.environments));
         }
     }
     found
+}
+
+/// Computes paired differences between two runs for each helper that both have, as
+/// [`differences`] does.
+pub fn run_differences(played: PlayedEpisodes<'_>, baseline: &[RunResult]) -> Vec<Difference> {
+    let (groups, baseline_groups) = (grouped(played.results), grouped(baseline));
+    let helpers: BTreeSet<&str> = groups.values().flat_map(|row| row.keys().copied()).collect();
+    let pairs = helpers.into_iter().map(|helper| {
+        difference((&groups, helper), (&baseline_groups, helper), played.environments)
+    });
+    pairs.filter(|difference| difference.all.is_some()).collect()
+}
+
+/// Compares two helpers, each with the results of its run, on the episodes that both have.
+fn difference(
+    (groups, helper): (&Groups<'_>, &str),
+    (baseline_groups, baseline): (&Groups<'_>, &str),
+    environments: &Environments,
+) -> Difference {
+    let mut tasks = BTreeMap::new();
+    let mut all = Clusters::default();
+    for (task, by_helper) in groups {
+        let baseline_rates = baseline_groups.get(task).and_then(|row| rates(row, baseline));
+        let Some((a, b)) = rates(by_helper, helper).zip(baseline_rates) else { continue };
+        let mut in_task = Clusters::default();
+        for (episode, rate) in a {
+            let Some(baseline_rate) = b.get(episode) else { continue };
+            let environment = environments.get(episode);
+            in_task.add(*task, environment, rate - baseline_rate);
+            all.add(*task, environment, rate - baseline_rate);
+        }
+        tasks.extend(in_task.interval().map(|interval| (*task, interval)));
+    }
+    let (helper, baseline) = (helper.to_owned(), baseline.to_owned());
+    Difference { helper, baseline, tasks, all: all.interval() }
 }
 
 /// Returns a helper's transport rates by episode, averaged over seeds.

@@ -228,6 +228,25 @@ fn differences_are_paired_with_intervals_over_houses() {
 }
 
 #[test]
+fn runs_are_compared_by_helper_on_common_episodes() {
+    let (results, environments) = (pairs(), Environments::default());
+    let played = PlayedEpisodes { results: &results, planned: &[], environments: &environments };
+    let as_none = |result: &RunResult| {
+        let mut result = result.clone();
+        result.key.helper = "rhp".to_owned();
+        result
+    };
+    let alone = results.iter().filter(|result| result.key.helper == "none");
+    let baseline: Vec<RunResult> = alone.map(as_none).collect();
+    let found = run_differences(played, &baseline);
+    assert_eq!(found.len(), 1, "the other run has no helper `none`");
+    let [rhp, none] = ["rhp", "none"].map(str::to_owned);
+    let expected = &differences(played, &[none, rhp])[0];
+    assert_eq!((&*found[0].helper, found[0].all), ("rhp", expected.all));
+    assert!(run_differences(played, &baseline[..0]).is_empty());
+}
+
+#[test]
 fn intervals_of_rates_are_clamped() {
     let scores = scores_in(&pairs(), &houses(&["a", "a", "b", "b"]), Formulas::PAPER);
     let score = scores.get(TaskId::LowTarget, "rhp").unwrap();

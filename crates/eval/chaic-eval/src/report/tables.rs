@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use chaic_core::TaskId;
 
 use crate::metrics::{Difference, Interval, Metric, RunResult, Score, Scores, resolution};
-use crate::report::labels::Labels;
+use crate::report::labels::{Labels, title};
 use crate::report::text_table::TextTable;
 
 /// Text of an undefined value, as in the paper.
@@ -163,6 +163,22 @@ pub fn pairs(
             granted.map_or(String::new(), |text| format!(". {text}"))
         ),
         header: header.collect(),
+        rows: differences.iter().map(row).collect(),
+    }
+}
+
+/// Builds the table of TR differences between this run and another, with 95 % intervals.
+pub fn run_pairs(differences: &[Difference], tasks: &[TaskId], baseline: &str) -> TextTable {
+    let header = ["TR difference".to_owned(), "all".to_owned()].into_iter();
+    let row = |d: &Difference| {
+        let cells = tasks.iter().map(|task| interval(d.tasks.get(task)));
+        [title(&d.helper), interval(d.all.as_ref())].into_iter().chain(cells).collect()
+    };
+    TextTable {
+        title: format!(
+            "TR minus that in {baseline} on the same episodes, with 95 % intervals over environments"
+        ),
+        header: header.chain(tasks.iter().map(|t| t.info().title.to_owned())).collect(),
         rows: differences.iter().map(row).collect(),
     }
 }

@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::error::Result;
 use crate::metrics::{
     Environments, FormulaSet, MAX_NAMED, PlayedEpisodes, RunResult, RunStatus, Score, Scores,
-    differences,
+    differences, run_differences,
 };
 use crate::report::Format;
 use crate::report::coverage::coverage;
@@ -18,7 +18,7 @@ use crate::report::figure::{figure_text, write_figure};
 use crate::report::labels::{GrantsFile, Labels};
 use crate::report::tables::{
     FAILED, MISSING, additional, counts, diagnostics, intervals, main_result, pairs, resolutions,
-    stuck,
+    run_pairs, stuck,
 };
 use crate::report::text_table::TextTable;
 use crate::run::{EpisodeJob, RunFolder, RunGrants, RunOptions, environments};
@@ -148,6 +148,24 @@ impl Report<'_> {
         text += &self.notes().iter().map(|n| format!("{n}\n")).collect::<String>();
         text += &self.errors();
         text
+    }
+
+    /// Formats the table of TR differences to the results of another run, whose folder is
+    /// `baseline`, for a terminal or as Markdown. Returns `None` if the runs have no helper with
+    /// common episodes.
+    pub fn differences_text(
+        &self,
+        baseline: &str,
+        results: &[RunResult],
+        format: Format,
+    ) -> Option<String> {
+        let differences = run_differences(self.played_episodes(&self.plan()), results);
+        let table = run_pairs(&differences, &self.scores().tasks(), baseline);
+        let text = match format {
+            Format::Markdown => table.to_markdown(),
+            _ => table.to_terminal(),
+        };
+        (!differences.is_empty()).then_some(text)
     }
 
     fn markdown(&self) -> String {

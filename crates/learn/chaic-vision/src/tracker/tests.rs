@@ -25,7 +25,7 @@ fn measurement(class: &str, score: f32, at: [f32; 3]) -> Measurement {
         n_pixels: 400,
         footprint: Vec::new(),
     };
-    Measurement { label: label(class), score, extent }
+    Measurement { names: vec![(label(class), score)], extent }
 }
 
 fn person(top_m: f32, at: [f32; 3]) -> Measurement {
@@ -117,6 +117,29 @@ fn uncertain_objects_need_several_detections() {
         observer.observe(&[measurement("wicker_basket", 0.15, at)]).is_empty(),
         "the score is too low"
     );
+}
+
+#[test]
+fn repeated_detections_with_several_names_make_the_class_certain() {
+    let mut observer = Observer::new(&[]);
+    let at = [0.0, 1.0, -2.0];
+    let mut uncertain = measurement("apple", 0.6, at);
+    uncertain.names.push((label("orange"), 0.3));
+    let first = observer.observe(std::slice::from_ref(&uncertain));
+    assert!((0.3..0.8).contains(&first[0].confidence), "{}", first[0].confidence);
+    for _ in 0..8 {
+        observer.observe(std::slice::from_ref(&uncertain));
+    }
+    let last = observer.observe(std::slice::from_ref(&uncertain));
+    assert_eq!((last[0].track, last[0].class.name()), (first[0].track, "apple"));
+    assert!(last[0].confidence > 0.9, "{}", last[0].confidence);
+    // The order of the names changes, and the object has moved a little.
+    let reversed = Measurement {
+        names: vec![(label("orange"), 0.5), (label("apple"), 0.4)],
+        ..measurement("orange", 0.5, [0.25, 1.0, -2.0])
+    };
+    let next = observer.observe(&[reversed]);
+    assert_eq!((next[0].track, next[0].class.name()), (first[0].track, "apple"));
 }
 
 #[test]

@@ -7,8 +7,11 @@ pub(super) const EXAMPLES: &[CommandExamples] = &[
         "chaic report",
         [
             ("Print the tables", "chaic report runs/quick"),
-            ("Print Markdown with intervals", "chaic report runs/quick --format md"),
             ("Draw the figure", "chaic report runs/quick --figure scores.svg"),
+            (
+                "Print what learned perception costs",
+                "chaic report runs/hidden --baseline runs/standard",
+            ),
         ],
     ),
     (

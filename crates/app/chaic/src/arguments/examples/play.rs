@@ -46,6 +46,20 @@ pub(super) const EXAMPLES: &[CommandExamples] = &[
         ],
     ),
     (
+        "chaic eval tracks",
+        [
+            ("Evaluate the built-in detector", "chaic eval tracks"),
+            (
+                "Evaluate weights of a training",
+                "chaic eval tracks --perception learned:runs/detection/detector.safetensors",
+            ),
+            (
+                "Use ground truth with the error rates of the detector",
+                "chaic eval tracks --perception noisy --n-episodes 64 --json tracks.json",
+            ),
+        ],
+    ),
+    (
         "chaic eval opponent",
         [
             (

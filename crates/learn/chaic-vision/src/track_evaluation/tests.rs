@@ -1,0 +1,57 @@
+//! Promises: perfect detections are tracked and remembered; errors lower the scores; the nearest
+//! pairs of one class match.
+
+use super::*;
+use crate::noisy::{DetectorNoiseModel, NoisyPerceptionFactory};
+
+fn evaluated(noise: DetectorNoiseModel) -> TrackReport {
+    let perception = NoisyPerceptionFactory::new(noise, "noisy".to_owned());
+    let stop = AtomicBool::new(false);
+    evaluate_tracks(&perception, DatasetSplit::Validation, 2, 2, &|| (), &stop).expect("no stop")
+}
+
+#[test]
+fn perfect_detections_are_remembered_and_errors_lower_the_scores() {
+    let perfect = evaluated(DetectorNoiseModel::none());
+    assert_eq!(perfect.episodes, 2);
+    assert!(perfect.detection_precision.value > 0.99, "{perfect:?}");
+    assert!(perfect.detection_recall.value > 0.95, "{perfect:?}");
+    assert!(perfect.memory_recall.value > 0.9, "{perfect:?}");
+    let noisy = evaluated(DetectorNoiseModel {
+        misclassification_rate: 0.3,
+        false_positives_per_image: 0.2,
+        ..DetectorNoiseModel::none()
+    });
+    assert!(noisy.detection_precision.value < perfect.detection_precision.value, "{noisy:?}");
+    assert!(noisy.memory_precision.value < perfect.memory_precision.value, "{noisy:?}");
+    assert!(noisy.identity_switches.value > perfect.identity_switches.value, "{noisy:?}");
+}
+
+#[test]
+fn the_nearest_pairs_of_one_class_match() {
+    let sighting = |class: &str, x: f32| Sighting {
+        class: ClassId::named(class),
+        position_in_world: Vec3::new(x, 0.0, 0.0),
+    };
+    let truth = |class: &str, x: f32, nearest_m: f32| TrueObject {
+        last: sighting(class, x),
+        nearest_m,
+        track: None,
+        n_switches: 0,
+    };
+    let record = EpisodeRecord {
+        objects: BTreeMap::from([
+            (EntityId(10), truth("apple", 0.0, 1.0)),
+            (EntityId(11), truth("apple", 0.4, 3.0)),
+            (EntityId(12), truth("banana", 5.0, 3.5)),
+            (EntityId(13), truth("banana", 9.0, f32::INFINITY)),
+        ]),
+        memory: vec![sighting("apple", 0.3), sighting("apple", 0.35), sighting("bread", 5.0)],
+        ..EpisodeRecord::default()
+    };
+    assert_eq!(record.matches(), [Some(EntityId(10)), Some(EntityId(11)), None]);
+    assert_eq!(record.memory_recall([0.0, 10.0]), [2, 3]);
+    assert_eq!(record.memory_recall([2.0, 4.0]), [1, 2]);
+    let rate = Rate::new([[1, 2], [3, 4]].into_iter());
+    assert!((rate.value - 4.0 / 6.0).abs() < 1e-9 && rate.interval > 0.0 && rate.n == 6);
+}

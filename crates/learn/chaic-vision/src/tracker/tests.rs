@@ -1,6 +1,6 @@
 //! Promises: an object keeps its track while it lies, is carried or is put down; two objects of one
-//! class have two tracks; uncertain objects are reported after a second detection; held objects are
-//! no detections.
+//! class have two tracks; uncertain objects are reported after a second detection; held objects and
+//! their contents are no detections.
 
 use chaic_agents::track::Carried;
 use chaic_core::briefing::{Companion, CompanionRole};
@@ -160,6 +160,46 @@ fn released_objects_keep_their_track() {
 }
 
 #[test]
+fn large_objects_keep_their_track_in_all_views_and_touching_ones_have_two() {
+    let [x, _, z] = ClassId::named("refrigerator").info().size_m;
+    // Points along a line from `from` to `to`, as seen from above.
+    let seen = |from: Vec2, to: Vec2| {
+        let footprint: Vec<Vec2> = (0..=8).map(|k| from.lerp(to, k as f32 / 8.0)).collect();
+        let middle = from.lerp(to, 0.5);
+        let mut seen = measurement("refrigerator", 0.9, [middle.x, 1.0, middle.y]);
+        (seen.extent.top_m, seen.extent.footprint) = (1.8, footprint);
+        seen
+    };
+    let corner = Vec2::new(0.0, -4.0);
+    let front = seen(corner, corner + Vec2::new(x, 0.0));
+    let side = seen(corner, corner - Vec2::new(0.0, z));
+    let mut observer = Observer::new(&[]);
+    let first = tracks(&observer.observe(std::slice::from_ref(&front)));
+    assert_eq!(tracks(&observer.observe(&[side])), first);
+    let neighbor = seen(corner + Vec2::new(x, 0.0), corner + Vec2::new(2.0 * x, 0.0));
+    let both = tracks(&observer.observe(&[neighbor, front]));
+    assert!(both.len() == 2 && both.contains(&first[0]), "{both:?}");
+}
+
+#[test]
+fn contents_of_a_held_container_are_no_detections() {
+    let mut observer = Observer::new(&[]);
+    let basket = observer.observe(&[measurement("plastic_basket", 0.9, [0.0, 0.8, -1.0])])[0].track;
+    let above = [-0.2, 1.25, -0.31 * 1.75];
+    for (n_contents, n_detections) in [(0, 1), (1, 0)] {
+        let carried = Carried {
+            object: Some((basket, ClassId::named("plastic_basket"))),
+            contents: Vec::new(),
+            n_contents,
+        };
+        observer
+            .tracker
+            .update_hands(&Hands { hands: [Some(carried), None], is_joint: false }, None);
+        assert_eq!(observer.observe(&[measurement("pen", 0.9, above)]).len(), n_detections);
+    }
+}
+
+#[test]
 fn carried_objects_keep_their_track() {
     let partner = (AgentId::PARTNER, CompanionRole::Partner);
     let mut observer = Observer::new(&[partner]);
@@ -171,6 +211,11 @@ fn carried_objects_keep_their_track() {
         let found = observer.observe(&[person(1.7, at), measurement("apple", 0.9, at)]);
         assert!(tracks(&found).contains(&apple) && found.len() == 2, "{found:?}");
     }
+    // The person is seen again later, far away.
+    observer.now += 1000;
+    at[0] += 12.0;
+    let found = observer.observe(&[person(1.7, at), measurement("apple", 0.9, at)]);
+    assert!(tracks(&found).contains(&apple), "{found:?}");
 }
 
 #[test]

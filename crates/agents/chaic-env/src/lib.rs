@@ -3,7 +3,7 @@
 //! **What it is**: the place where agents and world meet. An [`Env`] has an [`AgentSlot`] for each person
 //! of an episode, controlled by an agent or by the caller. It renders the observations of agents whose
 //! action has ended, resolves the pixels in their actions, submits the actions, and emits
-//! [`trace::Record`]s. A [`Playback`] re-simulates a trace, to show or to verify it. [`helper_registry`]
+//! [`trace::Record`]s. A [`Playback`] re-simulates a trace, to show or to verify it; [`narration`] describes it. [`helper_registry`]
 //! creates helpers by name; [`rules`] holds the rules of world and planners. An [`EnvBatch`] runs many
 //! environments in parallel.
 //!
@@ -53,6 +53,7 @@ mod env;
 mod error;
 pub mod helper_registry;
 mod key;
+pub mod narration;
 mod observer;
 mod playback;
 mod reseeded;

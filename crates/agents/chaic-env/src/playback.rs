@@ -1,7 +1,8 @@
 //! Re-simulation of a trace.
 
-use std::collections::VecDeque;
 use std::convert::Infallible;
+use std::ops::Deref;
+use std::sync::Arc;
 
 use chaic_core::agent::{ChildState, Thought};
 use chaic_core::{AgentId, Frame};
@@ -19,38 +20,65 @@ use crate::trace::{Decision, Header, Record, Trace};
 /// [`Playback::step`] advances one frame and refuses a trace that does not fit the world, for
 /// programs that show it. [`Playback::next_records`] returns the records that come out, for
 /// programs that compare them with the trace.
-pub struct Playback<'a> {
-    header: &'a Header,
+///
+/// `T` is a reference to a trace or a shared trace. A clone is a copy of the current state, from which
+/// the playback continues.
+#[derive(Clone)]
+pub struct Playback<T> {
+    trace: T,
     world: World,
-    /// Remaining decisions in order, each with the child's state that the trace has after it.
-    decisions: VecDeque<(&'a Decision, Option<ChildState>)>,
+    /// All decisions in order.
+    decisions: Arc<[RecordedDecision]>,
+    /// Number of decisions that were submitted.
+    n_submitted: usize,
     thoughts: Vec<Thought>,
     /// Frame of the trace's end, or of its last decision if it has no end.
     last_frame: Frame,
 }
 
-impl<'a> Playback<'a> {
+/// Decision in a trace.
+#[derive(Clone, Copy, Debug)]
+struct RecordedDecision {
+    /// Index of its record.
+    record: usize,
+    /// State of the child that the trace has after it.
+    child: Option<ChildState>,
+}
+
+impl<T: Deref<Target = Trace>> Playback<T> {
     /// Creates a playback at the first frame of the trace.
     ///
     /// # Errors
     /// If the episode is not the one of the trace.
-    pub fn new(trace: &'a Trace, episode: &Episode) -> Result<Playback<'a>> {
+    pub fn new(trace: T, episode: &Episode) -> Result<Playback<T>> {
         let world = world_from_header(&trace.header, episode)?;
         let n_agents = world.setup().people.len();
         let last_frame = trace.end().map(|e| e.frame);
         let last_frame = last_frame.or_else(|| trace.decisions().last().map(|d| d.frame));
         Ok(Playback {
-            header: &trace.header,
+            decisions: decisions(&trace).into(),
+            trace,
             world,
-            decisions: decisions(trace),
+            n_submitted: 0,
             thoughts: vec![Thought::default(); n_agents],
             last_frame: last_frame.unwrap_or(0),
         })
     }
 
     /// Returns the header of the trace.
-    pub fn header(&self) -> &'a Header {
-        self.header
+    pub fn header(&self) -> &Header {
+        &self.trace.header
+    }
+
+    /// Returns the frame of the trace's end, or of its last decision if it has no end.
+    pub fn last_frame(&self) -> Frame {
+        self.last_frame
+    }
+
+    /// Returns the number of decisions so far. The state's digest was that of the trace at each of
+    /// them, if [`Playback::step`] was used.
+    pub fn n_decisions(&self) -> usize {
+        self.n_submitted
     }
 
     /// Returns the world in its current state.
@@ -73,20 +101,18 @@ impl<'a> Playback<'a> {
         if self.world.is_over() || frame >= self.last_frame {
             return Ok(None);
         }
-        while let Some((d, _)) = self.decisions.pop_front_if(|(d, _)| d.frame == frame) {
-            self.note_thought(d);
+        while let Some((choice, recorded)) = self.next_choice(|d| d.frame == frame) {
             let digest = Digest(self.world.digest());
-            if digest != d.digest {
+            if digest != recorded {
                 return Err(self.altered(format!(
-                    "the state's digest is {} in the trace, {digest} when played again",
-                    d.digest
+                    "the state's digest is {recorded} in the trace, {digest} when played again"
                 )));
             }
-            self.world.submit(d.agent, d.action).map_err(|e| self.altered(e.to_string()))?;
+            let ChosenAction { agent, action, .. } = choice;
+            self.world.submit(agent, action).map_err(|e| self.altered(e.to_string()))?;
         }
-        if let Some((late, _)) = self.decisions.front().filter(|(d, _)| d.frame <= frame) {
-            let problem = format!("a decision of frame {} comes too late", late.frame);
-            return Err(self.altered(problem));
+        if let Some(late) = self.next_decision().map(|d| d.frame).filter(|late| *late <= frame) {
+            return Err(self.altered(format!("a decision of frame {late} comes too late")));
         }
         self.world.tick();
         Ok(Some(self.world.drain_events()))
@@ -121,40 +147,54 @@ impl<'a> Playback<'a> {
     fn take_choices(&mut self, waiting: &[AgentId]) -> Vec<ChosenAction> {
         let frame = self.world.state().frame;
         let mut choices: Vec<ChosenAction> = Vec::new();
-        while let Some((d, child)) = self.decisions.pop_front_if(|(d, _)| {
-            d.frame == frame
-                && waiting.contains(&d.agent)
-                && !choices.iter().any(|c| c.agent == d.agent)
+        while let Some((choice, _)) = self.next_choice(|d| {
+            let is_waiting = waiting.contains(&d.agent);
+            d.frame == frame && is_waiting && !choices.iter().any(|c| c.agent == d.agent)
         }) {
-            self.note_thought(d);
-            let Decision { agent, action, ref thought, .. } = *d;
-            choices.push(ChosenAction { agent, action, thought: thought.clone(), child });
+            choices.push(choice);
         }
         choices
     }
 
-    fn note_thought(&mut self, decision: &Decision) {
-        let slot = self.thoughts.get_mut(decision.agent.index());
-        if let (Some(thought), Some(slot)) = (&decision.thought, slot) {
+    fn next_decision(&self) -> Option<&Decision> {
+        self.decisions.get(self.n_submitted).and_then(|next| decision(&self.trace, *next))
+    }
+
+    /// Takes the next decision if it is this one, with the recorded digest; notes its thought.
+    fn next_choice(&mut self, is_it: impl Fn(&Decision) -> bool) -> Option<(ChosenAction, Digest)> {
+        let next = *self.decisions.get(self.n_submitted)?;
+        let decision = decision(&self.trace, next).filter(|decision| is_it(decision))?;
+        let Decision { agent, action, digest, ref thought, .. } = *decision;
+        let thought = thought.clone();
+        if let (Some(thought), Some(slot)) = (&thought, self.thoughts.get_mut(agent.index())) {
             slot.clone_from(thought);
         }
+        self.n_submitted += 1;
+        Some((ChosenAction { agent, action, thought, child: next.child }, digest))
     }
 
     fn altered(&self, problem: String) -> EnvError {
-        let (episode, frame) = (self.header.episode.clone(), self.world.state().frame);
+        let (episode, frame) = (self.header().episode.clone(), self.world.state().frame);
         EnvError::Altered { episode, frame, problem }
     }
 }
 
+fn decision(trace: &Trace, recorded: RecordedDecision) -> Option<&Decision> {
+    match trace.records.get(recorded.record) {
+        Some(Record::Decision(decision)) => Some(decision),
+        _ => None,
+    }
+}
+
 /// Returns the decisions of a trace, each with the child's state that the trace has after it.
-fn decisions(trace: &Trace) -> VecDeque<(&Decision, Option<ChildState>)> {
-    let mut decisions: VecDeque<(&Decision, Option<ChildState>)> = VecDeque::new();
-    for record in &trace.records {
-        match record {
-            Record::Decision(decision) => decisions.push_back((decision, None)),
+fn decisions(trace: &Trace) -> Vec<RecordedDecision> {
+    let mut decisions: Vec<RecordedDecision> = Vec::new();
+    for (record, content) in trace.records.iter().enumerate() {
+        match content {
+            Record::Decision(_) => decisions.push(RecordedDecision { record, child: None }),
             Record::Child(child) => {
-                if let Some((_, state)) = decisions.back_mut() {
-                    *state = Some(child.state);
+                if let Some(last) = decisions.last_mut() {
+                    last.child = Some(child.state);
                 }
             }
             Record::Event(_) | Record::End(_) => {}

@@ -42,7 +42,7 @@ pub use self::perception::{
 };
 pub use self::runs::{
     ExplainArguments, MergeArguments, RenderArguments, ReplayArguments, ReportArguments,
-    ShowArguments, VerifyArguments,
+    ShowArguments, VerifyArguments, ViewArguments,
 };
 pub use self::tools::{CompletionsArguments, ListCommand, ManArguments};
 
@@ -110,6 +110,8 @@ pub enum Command {
     Explain(ExplainArguments),
     /// Make a video of a recorded episode.
     Replay(ReplayArguments),
+    /// Write a page with replays for a browser: one file that needs no network.
+    View(ViewArguments),
     /// Render one frame of an episode: color, depth, ids, classes and normals.
     Render(RenderArguments),
     /// Export a scene for other programs.

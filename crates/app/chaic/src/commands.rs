@@ -23,6 +23,7 @@ pub mod shell;
 pub mod show;
 pub mod train;
 pub mod verify;
+pub mod view;
 
 mod bars;
 mod datasets;

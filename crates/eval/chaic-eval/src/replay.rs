@@ -10,12 +10,13 @@ use std::path::{Path, PathBuf};
 use chaic_agents::HelperInfo;
 use chaic_core::catalogue::TargetSet;
 use chaic_core::geom::Camera;
-use chaic_core::{Action, AgentId, EntityId, Frame, Outcome, ResolvedAction, TaskId, Vec2};
+use chaic_core::{AgentId, Frame, TaskId, Vec2};
+use chaic_env::narration::{Caption, event_text};
 use chaic_env::trace::Trace;
 use chaic_env::{Playback, slug};
 use chaic_episodes::Episode;
 use chaic_render::{Channels, Scene, View, floor_plan};
-use chaic_world::{EventKind, Setup, World};
+use chaic_world::{EventKind, World};
 use image::RgbImage;
 
 use self::belief_panel::BeliefView;
@@ -45,19 +46,6 @@ pub trait Masks {
     fn image_size(&self) -> u32;
 }
 
-/// Text about one agent's current activity.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Caption {
-    /// Name of the agent.
-    pub agent: String,
-    /// Current action.
-    pub action: String,
-    /// Current plan.
-    pub plan: String,
-    /// Last observed action of another agent, if the agent recognizes actions.
-    pub last_observed: Option<String>,
-}
-
 /// Preferred helpers if none is named. Other built-in helpers come last, and helpers of the user
 /// first.
 const PREFERRED_HELPERS: [&str; 6] = ["infer", "rhp", "oracle", "random", "follow", "none"];
@@ -69,6 +57,35 @@ fn preference(helper: &str) -> usize {
         None if HelperInfo::find_helper(helper).is_some() => PREFERRED_HELPERS.len() + 1,
         None => 0,
     }
+}
+
+/// Returns the paths of the traces of an episode, by its id with or without the task, with their
+/// helpers; those of all episodes, helpers and seeds if none is given.
+///
+/// # Errors
+/// If the folder cannot be read.
+pub fn find_traces(
+    folder: &RunFolder,
+    episode: Option<&str>,
+    helper: Option<&str>,
+    seed: Option<u32>,
+) -> Result<Vec<(PathBuf, String)>> {
+    let mut found = Vec::new();
+    for path in folder.traces()? {
+        // traces/TASK/HELPER/EPISODE-sSEED.jsonl
+        let part = |up: usize| path.iter().rev().nth(up).and_then(|p| p.to_str()).unwrap_or("");
+        let stem = part(0).trim_end_matches(".jsonl");
+        let Some((name, trace_seed)) = stem.rsplit_once("-s") else { continue };
+        let Ok(task) = part(2).parse::<TaskId>() else { continue };
+        let matches = episode.is_none_or(|episode| name == slug(task, episode))
+            && helper.is_none_or(|h| h == part(1))
+            && seed.is_none_or(|s| trace_seed == s.to_string());
+        if matches {
+            let helper = part(1).to_owned();
+            found.push((path, helper));
+        }
+    }
+    Ok(found)
 }
 
 /// Returns the path of the trace of an episode, by its id with or without the task. Without
@@ -83,20 +100,9 @@ pub fn find_trace(
     seed: Option<u32>,
 ) -> Result<PathBuf> {
     let traces = folder.traces()?;
-    let mut candidates: Vec<(usize, &PathBuf)> = Vec::new();
-    for path in &traces {
-        // traces/TASK/HELPER/EPISODE-sSEED.jsonl
-        let part = |up: usize| path.iter().rev().nth(up).and_then(|p| p.to_str()).unwrap_or("");
-        let stem = part(0).trim_end_matches(".jsonl");
-        let Some((name, trace_seed)) = stem.rsplit_once("-s") else { continue };
-        let Ok(task) = part(2).parse::<TaskId>() else { continue };
-        let matches = name == slug(task, episode)
-            && helper.is_none_or(|h| h == part(1))
-            && seed.is_none_or(|s| trace_seed == s.to_string());
-        if matches {
-            candidates.push((preference(part(1)), path));
-        }
-    }
+    let found = find_traces(folder, Some(episode), helper, seed)?;
+    let mut candidates: Vec<(usize, &PathBuf)> =
+        found.iter().map(|(path, helper)| (preference(helper), path)).collect();
     candidates.sort();
     candidates.first().map(|(_, p)| (*p).clone()).ok_or_else(|| {
         let examples: Vec<String> = traces
@@ -159,15 +165,9 @@ pub fn write(
     Ok(Some(n))
 }
 
-/// Returns the label and the id of an object, for example `apple #31`.
-pub(crate) fn object_name(setup: &Setup, entity: EntityId) -> String {
-    let class = setup.thing(entity).map(|thing| thing.class);
-    class.map_or(entity.to_string(), |class| format!("{} {entity}", class.info().label))
-}
-
 /// Renderer of a trace.
 pub struct Replay<'a> {
-    playback: Playback<'a>,
+    playback: Playback<&'a Trace>,
     scene: Scene,
     /// Last events, newest last.
     events: Vec<String>,
@@ -237,7 +237,7 @@ impl<'a> Replay<'a> {
             floor_plan::mark_believed_position(&mut map, self.world(), AgentId::HELPER, position);
         }
         let captions: Vec<Caption> =
-            self.world().setup().agents().map(|a| self.caption(a)).collect();
+            self.world().setup().agents().map(|a| Caption::new(&self.playback, a)).collect();
         panel::compose(&panel::Contents {
             header: self.playback.header(),
             world: self.world(),
@@ -260,62 +260,8 @@ impl<'a> Replay<'a> {
         Some(BeliefView { belief, true_set, true_person })
     }
 
-    fn caption(&self, agent: AgentId) -> Caption {
-        let person = &self.world().state().agents[agent.index()];
-        let action = match (&person.activity, &person.last) {
-            (Some(activity), _) => self.describe(&activity.action),
-            (None, Some((action, outcome))) => match outcome {
-                Outcome::Success => self.describe(action),
-                Outcome::Failure(reason) => format!("{} failed: {reason}", self.describe(action)),
-            },
-            (None, None) => "about to begin".to_owned(),
-        };
-        let thought = &self.playback.thoughts()[agent.index()];
-        let mode = thought.mode.as_ref().map_or(String::new(), |m| format!(" ({m})"));
-        let name = match agent {
-            AgentId::HELPER => format!("{agent} ({})", self.playback.header().helper),
-            _ => agent.to_string(),
-        };
-        let last_observed = thought.last_observed.clone();
-        Caption { agent: name, action, plan: format!("{}{mode}", thought.plan), last_observed }
-    }
-
-    fn describe(&self, action: &ResolvedAction) -> String {
-        match *action {
-            Action::MoveForward => "walks ahead".to_owned(),
-            Action::TurnLeft => "turns left".to_owned(),
-            Action::TurnRight => "turns right".to_owned(),
-            Action::PickUp { object, .. } => format!("picks up {}", self.name(object)),
-            Action::PutIn => "puts it into the container".to_owned(),
-            Action::PutOn { place, .. } => format!("puts it on {}", self.name(place)),
-            Action::RemoveObstacle { obstacle, .. } => format!("removes {}", self.name(obstacle)),
-            Action::Wait { .. } => "waits".to_owned(),
-        }
-    }
-
-    fn name(&self, entity: EntityId) -> String {
-        object_name(self.world().setup(), entity)
-    }
-
     fn log_event(&mut self, kind: &EventKind) {
-        let text = match *kind {
-            EventKind::Delivered { object, by, counted } => {
-                let note = if counted { "" } else { ", which isn't wanted" };
-                format!("{by} delivered {}{note}", self.name(object))
-            }
-            EventKind::Broke { agent, object } => format!("{agent} broke {}", self.name(object)),
-            EventKind::Ended { agent, action, outcome: Outcome::Failure(reason) }
-                if action.subject().is_some() =>
-            {
-                format!("{agent} {} in vain: {reason}", self.describe(&action))
-            }
-            EventKind::LiftedTogether { object, .. } => format!("both lift {}", self.name(object)),
-            EventKind::ChildAway { away: true } => "the child is away".to_owned(),
-            EventKind::ChildAway { away: false } => "the child is back".to_owned(),
-            EventKind::Over { complete: true } => "all is done".to_owned(),
-            EventKind::Over { complete: false } => "time is up".to_owned(),
-            _ => return,
-        };
+        let Some(text) = event_text(self.world().setup(), kind) else { return };
         if self.events.len() == panel::MAX_EVENTS {
             self.events.remove(0);
         }

@@ -5,8 +5,9 @@ use chaic_nn::Tensor;
 use chaic_nn::simd::widest;
 
 use crate::detector::{N_OFFSETS, STRIDE};
-use crate::labels::{BACKGROUND, half_extents_m};
+use crate::labels::{BACKGROUND, class_of, half_extents_m};
 use crate::loss::exp;
+use crate::views::PANELS;
 
 /// Detected object.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,6 +32,32 @@ impl Instance {
     pub fn score(&self) -> f32 {
         self.names[0].1
     }
+}
+
+/// Drops pixels that are farther from the center of their instance than the object reaches: those that
+/// show the background through a basket or a shelf. Panels of structures have no center.
+pub(crate) fn remove_background(instance: &mut Instance, depth_m: &[f32], camera: &Camera) {
+    /// Maximum distance from the center, relative to the diagonal of the class. The center of the
+    /// visible part is not that of the object, and some objects are larger than their class.
+    const MAX_DIAGONALS: f32 = 0.75;
+    /// Tolerance of that distance, meters.
+    const TOLERANCE_M: f32 = 0.15;
+    let Some(class) = class_of(instance.label()) else { return };
+    if PANELS.contains(&class.name()) {
+        return;
+    }
+    let [x, y, z] = class.info().size_m;
+    let radius_m = MAX_DIAGONALS * (x * x + y * y + z * z).sqrt() + TOLERANCE_M;
+    let (width, focal) = (camera.width, camera.focal_px());
+    let half = [camera.width, camera.height].map(|n| 0.5 * n as f32);
+    let center = instance.center;
+    instance.pixels.retain(|pixel| {
+        let depth = depth_m[*pixel as usize];
+        let u = (pixel % width) as f32 + 0.5 - half[0];
+        let v = (pixel / width) as f32 + 0.5 - half[1];
+        let point = [depth * u / focal, -depth * v / focal, -depth];
+        distance(point, center) < radius_m
+    });
 }
 
 /// Sorts instances by score, in descending order.

@@ -167,8 +167,9 @@ impl Candidate {
         } else {
             proposal.pixels.clone()
         };
-        let center = mean_point(pixels, &mask)?;
-        Some(Candidate { segment: Segment { label, score, pixels: mask, center }, names })
+        let center = proposal.center;
+        let segment = Segment { label, score, pixels: mask, center };
+        (!segment.pixels.is_empty()).then_some(Candidate { segment, names })
     }
 }
 
@@ -201,13 +202,6 @@ pub(crate) fn redrawn_pixels(mask: &[f32], roi: RoiBox, pixels: &Pixels) -> Vec<
         }
     }
     members
-}
-
-/// Mean position of pixels in the camera's frame, meters.
-fn mean_point(pixels: &Pixels, members: &[u32]) -> Option<[f32; 3]> {
-    let n = members.len() as f32;
-    let points = || members.iter().map(|k| pixels.pixels()[*k as usize].point);
-    (n > 0.0).then(|| std::array::from_fn(|axis| points().map(|p| p[axis]).sum::<f32>() / n))
 }
 
 /// Drops candidates that show the same object as a better one, and gives each pixel to the best

@@ -49,6 +49,9 @@ pub struct TrackerConfig {
     pub max_diameter: f32,
     /// Tolerance of that diameter: points from above are 0.125 m apart.
     pub diameter_tolerance_m: f32,
+    /// Large static objects whose centers are nearer than this fraction of the diagonal of their
+    /// class are the same, whatever the diameter: masks of neighbors may overlap.
+    pub near_extents: f32,
     /// Maximum displacement if detection and track have no label in common.
     pub max_relabeled_m: f32,
     /// Factor of the class evidence of a track at each new detection: successive images are similar,
@@ -81,6 +84,7 @@ impl Default for TrackerConfig {
             max_static_m: 0.4,
             max_diameter: 1.05,
             diameter_tolerance_m: 0.2,
+            near_extents: 0.5,
             max_relabeled_m: 0.15,
             evidence_decay: 0.9,
             carried_m_per_frame: 0.04,
@@ -528,7 +532,11 @@ impl Track {
         let seen = large_extent(self.label, measurement);
         let has_moved = self.is_carried || self.is_released || is_carried;
         self.extent = match (&self.extent, seen) {
-            (Some(extent), Some(seen)) if !has_moved => Some(extent.union(&seen)),
+            (Some(extent), Some(seen)) if !has_moved => {
+                // A mask that overlaps a neighbor does not enlarge the object.
+                let fits = config.fits_object(self.label, extent, &seen);
+                Some(if fits { extent.union(&seen) } else { *extent })
+            }
             (_, seen) => seen,
         };
         (self.last_seen, self.is_carried, self.is_released) = (now, is_carried, false);
@@ -536,11 +544,17 @@ impl Track {
 }
 
 impl TrackerConfig {
-    /// Returns whether two extents can belong to one object. Some objects are larger than their
-    /// class; the larger extent shows it.
+    /// Returns whether two extents can belong to one object: their union is not larger than an
+    /// object, or their centers are near.
     fn is_one_object(&self, label: u8, a: &PlanExtent, b: &PlanExtent) -> bool {
-        let [x, _, z] = extents_m(label);
-        let max_m = self.max_diameter * (x * x + z * z).sqrt();
+        let near_m = self.near_extents * diagonal_m(label);
+        self.fits_object(label, a, b) || a.center().distance(b.center()) < near_m
+    }
+
+    /// Returns whether the union of two extents is not larger than an object. Some objects are larger
+    /// than their class; the larger extent shows it.
+    fn fits_object(&self, label: u8, a: &PlanExtent, b: &PlanExtent) -> bool {
+        let max_m = self.max_diameter * diagonal_m(label);
         let max_m = max_m.max(a.diameter_m()).max(b.diameter_m());
         a.union(b).diameter_m() < max_m + self.diameter_tolerance_m
     }
@@ -550,6 +564,12 @@ impl TrackerConfig {
 fn large_extent(label: u8, measurement: &Measurement) -> Option<PlanExtent> {
     let is_large = !matches!(pixel_kind(label), PixelKind::Small | PixelKind::Person);
     is_large.then(|| PlanExtent::new(&measurement.extent.footprint)).flatten()
+}
+
+/// Diagonal of a class from above, meters.
+fn diagonal_m(label: u8) -> f32 {
+    let [x, _, z] = extents_m(label);
+    (x * x + z * z).sqrt()
 }
 
 fn pixel_kind(label: u8) -> PixelKind {

@@ -9,7 +9,7 @@ use chaic_nn::{Inference, Network, Pass, Shape, weights};
 use crate::calibration::{Calibration, N_PREDICTORS, predictors};
 use crate::detector::Detector;
 use crate::features::{ImageCrop, N_FEATURES, features};
-use crate::instances::{Instance, InstanceConfig, Pixels, sort_by_score};
+use crate::instances::{Instance, InstanceConfig, Pixels, remove_background, sort_by_score};
 use crate::proposals::proposals;
 use crate::roi::RoiSource;
 use crate::roi_network::RoiNetwork;
@@ -169,6 +169,10 @@ impl TrainedDetector {
             }
             _ => pixels.instances(depth_m, &InstanceConfig::DEFAULT),
         };
+        for instance in &mut instances {
+            remove_background(instance, depth_m, camera);
+        }
+        instances.retain(|instance| !instance.pixels.is_empty());
         for instance in &mut instances {
             for (_, score) in &mut instance.names {
                 let predictors = predictors(*score, instance.pixels.len(), instance.center);

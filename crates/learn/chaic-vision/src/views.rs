@@ -477,7 +477,7 @@ impl SyntheticViews {
 }
 
 /// Classes whose objects are panels of a longer structure.
-const PANELS: [&str; 1] = ["fence"];
+pub(crate) const PANELS: [&str; 1] = ["fence"];
 /// Maximum gap between panels of one structure, meters.
 const MAX_PANEL_GAP_M: f32 = 0.1;
 

@@ -105,6 +105,24 @@ pub struct ReplayArguments {
     pub masks: bool,
 }
 
+/// `chaic view`.
+#[derive(Args, Debug)]
+pub struct ViewArguments {
+    /// Folder of the run.
+    pub run: PathBuf,
+    /// Id of the episode, for example obstacle/test/00 [default: all, at most --max].
+    pub episode: Option<String>,
+    /// Page to write [default: view.html in the folder of the run].
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Only replays of this helper.
+    #[arg(long, value_name = "NAME")]
+    pub helper: Option<String>,
+    /// Largest number of replays in the page, 1 to 1000.
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub max: u32,
+}
+
 /// `chaic render`.
 #[derive(Args, Debug)]
 pub struct RenderArguments {

@@ -7,7 +7,7 @@ use chaic_world::{EventKind, Setup};
 
 use super::{Change, ModeChange, Shift};
 use crate::recorded_belief::{Distribution, IDENTIFIED_PER_MILLE, most_likely, per_mille_of};
-use crate::replay::object_name;
+use chaic_env::narration::object_name;
 
 /// Probabilities whose crossing is reported, per mille.
 const THRESHOLDS_PER_MILLE: [u16; 3] = [500, IDENTIFIED_PER_MILLE, 900];

@@ -9,12 +9,12 @@ use chaic_render::text::{self, Align};
 use chaic_world::World;
 use image::{Rgb, RgbImage, imageops};
 
-use crate::replay::Caption;
 use crate::replay::belief_panel::{self, BeliefView};
 use crate::replay::layout::{
     BAR, BAR_BACKGROUND, FAINT, HEIGHT_PX, INK, MARGIN_PX, SIDE_COLUMN_PX, SIDE_X_PX, VIEW_PX,
     WIDTH_PX, fill, wrapped,
 };
+use chaic_env::narration::Caption;
 
 const HEADER_PX: u32 = 44;
 const BACKGROUND: [u8; 3] = [250, 250, 248];

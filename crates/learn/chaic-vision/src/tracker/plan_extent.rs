@@ -16,6 +16,9 @@ const DIRECTIONS: [Vec2; 8] = [
     Vec2::new(-0.923_879_5, 0.382_683_43),
 ];
 
+/// Fraction of the points that are outliers, at each end.
+const OUTLIERS: f32 = 0.05;
+
 /// Smallest and largest coordinate of a set of points (x, z) in each direction, meters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PlanExtent {
@@ -23,13 +26,16 @@ pub(super) struct PlanExtent {
 }
 
 impl PlanExtent {
-    /// Measures points; `None` without any.
+    /// Measures points; `None` without any. Masks contain some pixels of the background, so
+    /// [`OUTLIERS`] of the points are left out at both ends of each direction.
     pub fn new(points: &[Vec2]) -> Option<PlanExtent> {
-        let (first, rest) = points.split_first()?;
-        let of_point = |point: &Vec2| PlanExtent {
-            ranges: DIRECTIONS.map(|direction| [direction.dot(*point); 2]),
+        let n_outliers = (OUTLIERS * points.len() as f32) as usize;
+        let range = |direction: Vec2| {
+            let mut values: Vec<f32> = points.iter().map(|point| direction.dot(*point)).collect();
+            values.sort_by(f32::total_cmp);
+            [values[n_outliers], values[values.len() - 1 - n_outliers]]
         };
-        Some(rest.iter().fold(of_point(first), |extent, point| extent.union(&of_point(point))))
+        (!points.is_empty()).then(|| PlanExtent { ranges: DIRECTIONS.map(range) })
     }
 
     /// Extent of the points of both sets.
@@ -67,5 +73,9 @@ mod tests {
         assert!((2.15..2.24).contains(&both.diameter_m()), "{}", both.diameter_m());
         assert_eq!(both.center(), Vec2::new(1.0, -0.5));
         assert_eq!(PlanExtent::new(&[]), None);
+        let mut points: Vec<Vec2> = (0..=40).map(|k| Vec2::new(0.05 * k as f32, 0.0)).collect();
+        points.push(Vec2::new(9.0, 0.0));
+        let diameter_m = PlanExtent::new(&points).unwrap().diameter_m();
+        assert!((1.7..2.0).contains(&diameter_m), "{diameter_m}");
     }
 }

@@ -87,6 +87,14 @@ pub(super) const EXAMPLES: &[CommandExamples] = &[
         ],
     ),
     (
+        "chaic view",
+        [
+            ("Write a page with the replays of a run", "chaic view runs/quick"),
+            ("Only one episode, by all helpers", "chaic view runs/quick low_target/test/00"),
+            ("Only one helper", "chaic view runs/quick --helper rhp --out replays.html"),
+        ],
+    ),
+    (
         "chaic replay",
         [
             (

@@ -1,0 +1,285 @@
+//! Player of one trace.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use chaic_core::agent::PartnerBelief;
+use chaic_core::{AgentId, Frame, Vec2};
+use chaic_env::narration::Caption;
+use chaic_env::trace::{Trace, parse};
+use chaic_env::{EnvError, Playback};
+use chaic_episodes::{Episode, EpisodeError};
+use chaic_render::{Channels, Scene, View, floor_plan};
+use serde::Serialize;
+
+use crate::timeline::Timeline;
+
+/// Distance between stored states, frames: the time to any frame is that of this many frames.
+const KEYFRAME_INTERVAL: Frame = 100;
+
+/// Reason why a replay cannot be opened or drawn.
+#[derive(Debug, thiserror::Error)]
+pub enum PlayerError {
+    /// The trace is unreadable or does not fit the episode.
+    #[error(transparent)]
+    Trace(#[from] EnvError),
+    /// The episode is unreadable.
+    #[error(transparent)]
+    Episode(#[from] EpisodeError),
+    /// The episode has no such agent.
+    #[error("the episode has no agent {0}")]
+    NoAgent(AgentId),
+}
+
+/// Facts about a replay that do not change.
+#[derive(Clone, Debug, Serialize)]
+pub struct ReplayInfo {
+    /// Name of the task.
+    pub task: &'static str,
+    /// Episode id.
+    pub episode: String,
+    /// Name of the helper.
+    pub helper: String,
+    /// Index of the seed.
+    pub seed: u32,
+    /// Version of the program that wrote the trace.
+    pub chaic: String,
+    /// Agents with their descriptions, by id.
+    pub agents: Vec<AgentInfo>,
+    /// Wanted objects, for example `3 apple`.
+    pub goal: Vec<String>,
+    /// Last frame that can be shown.
+    pub last_frame: Frame,
+    /// Length of the trace in frames; larger than `last_frame` if the trace is altered.
+    pub length: Frame,
+    /// Frames per second of simulated time.
+    pub frames_per_second: u32,
+    /// Total value of the goal.
+    pub total: f64,
+    /// Number of decisions whose digest equals that of the re-simulation.
+    pub n_verified: usize,
+    /// Number of decisions in the trace.
+    pub n_decisions: usize,
+    /// Why the re-simulation stopped; absent for an intact trace.
+    pub problem: Option<String>,
+    /// Activities, events and deliveries.
+    pub timeline: Timeline,
+}
+
+/// Description of an agent.
+#[derive(Clone, Debug, Serialize)]
+pub struct AgentInfo {
+    /// Agent id.
+    pub id: AgentId,
+    /// Name: partner, helper or child.
+    pub name: String,
+    /// Kind of person.
+    pub person: String,
+    /// Lowest and highest reach, meters.
+    pub reach_m: [f32; 2],
+    /// Maximum lifted mass, kilograms.
+    pub strength_kg: f32,
+}
+
+/// State of one frame.
+#[derive(Clone, Debug, Serialize)]
+pub struct FrameState {
+    /// Frame.
+    pub frame: Frame,
+    /// Action and plan of each agent.
+    pub captions: Vec<AgentCaption>,
+    /// Achieved value of the goal.
+    pub done: f64,
+    /// Number of verified decisions so far.
+    pub n_verified: usize,
+    /// Belief of the helper, if it records one.
+    pub belief: Option<PartnerBelief>,
+}
+
+/// Caption of one agent.
+#[derive(Clone, Debug, Serialize)]
+pub struct AgentCaption {
+    /// Name of the agent.
+    pub agent: String,
+    /// Current action.
+    pub action: String,
+    /// Current plan.
+    pub plan: String,
+    /// Last observed action of another agent, for agents that recognize actions.
+    pub last_observed: Option<String>,
+}
+
+/// Color image.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DrawnImage {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Red, green, blue and 255 of each pixel, row by row.
+    pub rgba: Vec<u8>,
+}
+
+/// Re-simulation of a trace with a movable position.
+pub struct ReplayPlayer {
+    info: ReplayInfo,
+    scene: Scene,
+    current: Playback<Arc<Trace>>,
+    /// States at multiples of [`KEYFRAME_INTERVAL`].
+    keyframes: Vec<Playback<Arc<Trace>>>,
+}
+
+impl ReplayPlayer {
+    /// Opens a trace (JSON lines) of an episode (JSON), and re-simulates it once. An altered trace can
+    /// be shown up to the frame that differs.
+    ///
+    /// # Errors
+    /// If the trace or the episode is unreadable, or they do not belong together.
+    pub fn open(trace: &[u8], episode: &[u8]) -> Result<ReplayPlayer, PlayerError> {
+        let (trace, warnings) = parse(trace, Path::new("trace"))?;
+        let episode = Episode::parse(episode, "episode")?;
+        let trace = Arc::new(trace);
+        let mut playback = Playback::new(Arc::clone(&trace), &episode)?;
+        let scene = Scene::with_appearance(playback.world().setup(), trace.header.appearance);
+        let (mut keyframes, mut timeline) = (vec![playback.clone()], Timeline::default());
+        let mut problem = warnings.first().map(ToString::to_string);
+        loop {
+            match playback.step() {
+                Ok(Some(events)) => timeline.add(playback.world(), &events),
+                Ok(None) => break,
+                Err(error) => {
+                    problem = Some(error.to_string());
+                    break;
+                }
+            }
+            if playback.world().state().frame.is_multiple_of(KEYFRAME_INTERVAL) {
+                keyframes.push(playback.clone());
+            }
+        }
+        let n_decisions = trace.decisions().count();
+        let info = ReplayInfo {
+            last_frame: playback.world().state().frame,
+            n_verified: playback.n_decisions().min(n_decisions),
+            n_decisions,
+            problem,
+            timeline,
+            ..ReplayInfo::new(&playback)
+        };
+        let current = keyframes[0].clone();
+        Ok(ReplayPlayer { info, scene, current, keyframes })
+    }
+
+    /// Returns the facts that do not change.
+    pub fn info(&self) -> &ReplayInfo {
+        &self.info
+    }
+
+    /// Moves to a frame, at most the last one.
+    ///
+    /// # Errors
+    /// Never after [`ReplayPlayer::open`] has verified the frames.
+    pub fn seek(&mut self, frame: Frame) -> Result<(), PlayerError> {
+        let frame = frame.min(self.info.last_frame);
+        let now = self.current.world().state().frame;
+        let keyframe = (frame / KEYFRAME_INTERVAL) as usize;
+        if frame < now || frame / KEYFRAME_INTERVAL > now / KEYFRAME_INTERVAL {
+            self.current = self.keyframes[keyframe.min(self.keyframes.len() - 1)].clone();
+        }
+        while self.current.world().state().frame < frame && self.current.step()?.is_some() {}
+        Ok(())
+    }
+
+    /// Returns the state of the current frame.
+    pub fn state(&self) -> FrameState {
+        let world = self.current.world();
+        let caption = |agent: AgentId| {
+            let Caption { agent, action, plan, last_observed } = Caption::new(&self.current, agent);
+            AgentCaption { agent, action, plan, last_observed }
+        };
+        let helper = self.current.thoughts().get(AgentId::HELPER.index());
+        FrameState {
+            frame: world.state().frame,
+            captions: world.setup().agents().map(caption).collect(),
+            done: world.progress().0,
+            n_verified: self.current.n_decisions(),
+            belief: helper.and_then(|thought| thought.belief.as_deref()).cloned(),
+        }
+    }
+
+    /// Draws what an agent sees at the current frame, as a square image.
+    ///
+    /// # Errors
+    /// If the episode has no such agent.
+    pub fn draw_view(&self, agent: AgentId, side_px: u32) -> Result<DrawnImage, PlayerError> {
+        let world = self.current.world();
+        if !world.setup().agents().any(|other| other == agent) {
+            return Err(PlayerError::NoAgent(agent));
+        }
+        let view = View::from_agent(world, agent, side_px, Channels::RGB);
+        let images = self.scene.render(world, &[view]);
+        let rgb = images.into_iter().next().and_then(|images| images.rgb).unwrap_or_default();
+        Ok(DrawnImage::from_rgb(side_px, side_px, &rgb))
+    }
+
+    /// Draws the map of the current frame, with the ring of the helper's belief about the partner's
+    /// position if it records one.
+    pub fn draw_map(&self, width_px: u32) -> DrawnImage {
+        let world = self.current.world();
+        let mut map = floor_plan::draw_scene_plan(&self.scene, world, width_px);
+        let helper = self.current.thoughts().get(AgentId::HELPER.index());
+        let belief = helper.and_then(|thought| thought.belief.as_deref());
+        if let Some([x, z]) = belief.and_then(|belief| belief.position_cm) {
+            let position = Vec2::new(0.01 * x as f32, 0.01 * z as f32);
+            floor_plan::mark_believed_position(&mut map, world, AgentId::HELPER, position);
+        }
+        DrawnImage::from_rgb(map.width(), map.height(), map.as_raw())
+    }
+}
+
+impl ReplayInfo {
+    fn new(playback: &Playback<Arc<Trace>>) -> ReplayInfo {
+        /// Frames per second of simulated time (docs/rules.md, time).
+        const FRAMES_PER_SECOND: u32 = 30;
+        let (header, world) = (playback.header(), playback.world());
+        let setup = world.setup();
+        let agent = |(id, person): (AgentId, &chaic_world::AgentSpec)| {
+            let capability = person.capability();
+            AgentInfo {
+                id,
+                name: id.to_string(),
+                person: person.kind().to_string(),
+                reach_m: capability.pick_range_m,
+                strength_kg: capability.strength_kg,
+            }
+        };
+        let goal =
+            setup.goal.targets.iter().map(|(class, n)| format!("{n} {}", class.info().label));
+        ReplayInfo {
+            task: header.task.info().title,
+            episode: header.episode.clone(),
+            helper: header.helper.clone(),
+            seed: header.seed,
+            chaic: header.chaic.clone(),
+            agents: setup.agents().zip(&setup.people).map(agent).collect(),
+            goal: goal.collect(),
+            last_frame: 0,
+            length: playback.last_frame(),
+            frames_per_second: FRAMES_PER_SECOND,
+            total: world.progress().1,
+            n_verified: 0,
+            n_decisions: 0,
+            problem: None,
+            timeline: Timeline::default(),
+        }
+    }
+}
+
+impl DrawnImage {
+    fn from_rgb(width: u32, height: u32, rgb: &[u8]) -> DrawnImage {
+        let rgba = rgb.as_chunks::<3>().0.iter().flat_map(|[r, g, b]| [*r, *g, *b, u8::MAX]);
+        DrawnImage { width, height, rgba: rgba.collect() }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,98 @@
+//! Promises: a frame looks the same however it is reached; an altered trace is shown up to the frame
+//! that differs; damaged input gives an error.
+
+use chaic_core::AgentError;
+use chaic_env::helper_registry::{BuiltInHelpers, HelperRegistry as _};
+use chaic_env::{Env, EpisodeConfig};
+use chaic_episodes::find_episode;
+
+use super::*;
+use crate::timeline::ActivityKind;
+
+/// Plays the first frames of an episode; returns the trace and the episode as files.
+fn played(id: &str, helper: &str, n_frames: Frame) -> (String, String) {
+    let mut setup = find_episode(id).unwrap().into_setup();
+    setup.horizon = n_frames;
+    let episode = Episode::new(id, "short", None, setup).unwrap();
+    let config = EpisodeConfig { image_size: Some(64), ..EpisodeConfig::new(&episode, helper) };
+    let agent = BuiltInHelpers.make(helper, config.rules.planner);
+    let mut env = Env::new(config, agent).unwrap();
+    let mut lines = vec![env.header().to_line()];
+    let stop = std::sync::atomic::AtomicBool::new(false);
+    env.run(&stop, None, &mut |record| -> Result<(), AgentError> {
+        lines.push(record.to_line());
+        Ok(())
+    })
+    .unwrap();
+    (lines.join("\n") + "\n", episode.to_json())
+}
+
+#[test]
+fn a_frame_is_the_same_however_it_is_reached() {
+    let (trace, episode) = played("shopping/test/00", "rhp", 450);
+    let open = || ReplayPlayer::open(trace.as_bytes(), episode.as_bytes()).unwrap();
+    let mut player = open();
+    let info = player.info().clone();
+    assert_eq!((info.last_frame, info.length, info.problem), (450, 450, None));
+    assert!(info.n_verified == info.n_decisions && info.n_decisions > 50);
+    assert!(info.agents.len() == 3 && info.total > 0.0);
+    let frame = |player: &ReplayPlayer| {
+        let view = player.draw_view(AgentId::HELPER, 64).unwrap();
+        (serde_json::to_string(&player.state()).unwrap(), view, player.draw_map(120))
+    };
+    player.seek(337).unwrap();
+    let expected = frame(&player);
+    for path in [&[450, 337][..], &[0, 336, 337], &[100, 300, 337], &[9_999, 250, 337]] {
+        path.iter().for_each(|to| player.seek(*to).unwrap());
+        assert_eq!(frame(&player), expected, "{path:?}");
+    }
+    // Drawing other frames in between changes nothing.
+    for path in [[450, 334, 335, 337], [0, 120, 250, 337], [336, 338, 339, 337]] {
+        let mut last = None;
+        for to in path {
+            player.seek(to).unwrap();
+            last = Some(frame(&player));
+        }
+        assert!(last.as_ref() == Some(&expected), "{path:?}");
+    }
+    assert_eq!(expected.1.rgba.len(), 4 * 64 * 64);
+    let activities = &info.timeline.activities;
+    assert!(activities.iter().any(|a| a.agent == AgentId::PARTNER && a.kind == ActivityKind::Walk));
+    assert!(activities.iter().all(|a| a.start <= a.end));
+    assert!(info.timeline.story.iter().any(|line| line.text == "time is up"));
+    assert!(player.draw_view(AgentId(7), 64).is_err());
+}
+
+#[test]
+fn an_altered_trace_is_shown_up_to_the_frame_that_differs() {
+    let (trace, episode) = played("no_constraint/test/00", "random", 300);
+    let line = trace.lines().skip(1).filter(|line| line.contains("\"turn_left\"")).nth(3).unwrap();
+    let altered = trace.replacen(line, &line.replace("turn_left", "turn_right"), 1);
+    let player = ReplayPlayer::open(altered.as_bytes(), episode.as_bytes()).unwrap();
+    let info = player.info();
+    let problem = info.problem.as_deref().unwrap_or_default();
+    assert!(problem.contains("digest") || problem.contains("too late"), "{problem}");
+    assert!(info.last_frame < 300 && info.length == 300 && info.n_verified < info.n_decisions);
+}
+
+#[test]
+fn damaged_and_foreign_files_are_refused() {
+    let (trace, episode) = played("no_constraint/test/00", "none", 300);
+    let (_, other) = played("no_constraint/test/01", "none", 60);
+    let open = |trace: &str, episode: &str| {
+        ReplayPlayer::open(trace.as_bytes(), episode.as_bytes()).map(|player| player.info().clone())
+    };
+    for (trace, episode) in [
+        ("", &*episode),
+        ("{}", &episode),
+        ("nonsense", &episode),
+        (&trace[..40], &episode),
+        (&trace, ""),
+        (&trace, "{\"format\": 3}"),
+        (&trace, &other),
+    ] {
+        assert!(open(trace, episode).is_err(), "{trace:.40} {episode:.40}");
+    }
+    let cut = open(&trace[..trace.len() * 9 / 10], &episode).unwrap();
+    assert!(cut.problem.is_some() && cut.n_verified > 0, "{cut:?}");
+}

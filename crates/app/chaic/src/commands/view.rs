@@ -1,0 +1,54 @@
+//! `chaic view`.
+
+use anyhow::{Result, bail};
+use chaic_eval::replay::find_traces;
+use chaic_eval::run::RunFolder;
+use chaic_files::write_atomically;
+use chaic_page::{PageReplay, replay_page};
+use serde_json::json;
+
+use crate::arguments::ViewArguments;
+use crate::exit::ExitStatus;
+use crate::output::{OutputFormat, counted, print_result, print_warning, quoted_path};
+
+/// Default name of the page.
+const FILE_NAME: &str = "view.html";
+
+/// Writes a page with replays of a run.
+pub fn run(arguments: &ViewArguments, format: OutputFormat) -> Result<ExitStatus> {
+    let ViewArguments { run, episode, out, helper, max } = arguments;
+    let (folder, options) = RunFolder::read(run)?;
+    let found = find_traces(&folder, episode.as_deref(), helper.as_deref(), None)?;
+    let mut replays: Vec<(String, String, String)> = Vec::new();
+    for (path, _) in found.iter().take(*max as usize) {
+        let (trace, warnings) = folder.read_trace(path)?;
+        warnings.iter().for_each(|warning| print_warning(&warning.to_string()));
+        let key = trace.header.key();
+        let name = format!("{}, {}, seed {}", key.episode, key.helper, key.seed);
+        let lines: Vec<String> = trace.lines().collect();
+        let episode = folder.episode(&options, &key)?.to_json_line();
+        replays.push((name, lines.join("\n") + "\n", episode));
+    }
+    if replays.is_empty() {
+        let episode = episode.as_ref().map_or(String::new(), |episode| format!(" of {episode}"));
+        let helper = helper.as_ref().map_or(String::new(), |helper| format!(" with {helper}"));
+        bail!("{} has no trace{episode}{helper}; `chaic show` lists what it has", run.display());
+    }
+    let pages: Vec<PageReplay<'_>> =
+        replays.iter().map(|(name, trace, episode)| PageReplay { name, trace, episode }).collect();
+    let page = replay_page(&format!("chaic: replays of {}", run.display()), &pages);
+    let out = out.clone().unwrap_or_else(|| folder.path().join(FILE_NAME));
+    write_atomically(&out, page.as_bytes())?;
+    if let Some(n @ 1..) = found.len().checked_sub(replays.len()) {
+        print_warning(&format!("{n} more replays are left out; see --max and --helper"));
+    }
+    let (n, bytes) = (replays.len(), page.len());
+    let size = format!("{:.1} MB", bytes as f64 / 1e6);
+    let text = format!(
+        "{} of {}; open it in a browser\n",
+        counted(n, "replay"),
+        quoted_path(&out) + " (" + &size + ")"
+    );
+    print_result(format, &json!({ "out": out, "replays": n, "bytes": bytes }), &text)?;
+    Ok(ExitStatus::Success)
+}

@@ -1,0 +1,57 @@
+// Builds the module and the scripts of the pages into crates/eval/chaic-page/bundle. `--check` compares them
+// with the committed files instead.
+
+import { execFileSync } from "node:child_process";
+import { mkdtempSync, readFileSync, writeFileSync, mkdirSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { dirname, join } from "node:path";
+import { fileURLToPath } from "node:url";
+import { build } from "esbuild";
+
+const web = dirname(fileURLToPath(import.meta.url));
+const root = dirname(web);
+const isCheck = process.argv.includes("--check");
+const out = isCheck ? mkdtempSync(join(tmpdir(), "chaic-web-")) : join(root, "crates/eval/chaic-page/bundle");
+const target = process.env.CARGO_TARGET_DIR ?? join(root, "target");
+mkdirSync(out, { recursive: true });
+
+const run = (program, args, env = {}) =>
+  execFileSync(program, args, { cwd: root, stdio: "inherit", env: { ...process.env, ...env } });
+
+// The module does not depend on the folder in which it is built.
+const flags = ["-Ctarget-feature=+simd128", `--remap-path-prefix=${root}=`];
+const home = process.env.CARGO_HOME ?? join(process.env.HOME ?? "", ".cargo");
+flags.push(`--remap-path-prefix=${home}=`);
+const triple = "wasm32-unknown-unknown";
+run("cargo", ["build", "--locked", "--profile", "web", "--target", triple, "-p", "chaic-web"], {
+  CARGO_ENCODED_RUSTFLAGS: flags.join("\u001f"),
+});
+const wasm = join(target, triple, "web/chaic_web.wasm");
+run("wasm-bindgen", ["--target", "web", "--no-typescript", "--out-dir", join(web, "pkg"), wasm]);
+
+const options = {
+  absWorkingDir: web,
+  bundle: true,
+  format: "iife",
+  legalComments: "eof",
+  minify: true,
+  target: "es2022",
+  // The glue loads the module from an address only if it gets no bytes.
+  define: { "import.meta.url": '""' },
+};
+for (const name of ["worker", "page"]) {
+  await build({ ...options, entryPoints: [`src/${name}.ts`], outfile: join(out, `${name}.js`) });
+}
+writeFileSync(join(out, "chaic_web.wasm"), readFileSync(join(web, "pkg/chaic_web_bg.wasm")));
+
+if (isCheck) {
+  for (const name of ["worker.js", "page.js", "chaic_web.wasm"]) {
+    const [built, committed] = [out, join(root, "crates/eval/chaic-page/bundle")].map((folder) =>
+      readFileSync(join(folder, name)),
+    );
+    if (!built.equals(committed)) {
+      console.error(`${name} differs from the committed file; run \`npm run build\` in web/`);
+      process.exitCode = 1;
+    }
+  }
+}

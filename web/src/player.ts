@@ -1,0 +1,94 @@
+// Player of one replay in a worker. Of several requests while the worker draws, only the last counts.
+
+import type { FrameState, Picture, ReplayInfo, Request, Response } from "./messages.js";
+
+/** Drawn frame. */
+export interface DrawnFrame {
+  state: FrameState;
+  views: Picture[];
+  map: Picture;
+}
+
+/** What a player needs. */
+export interface Source {
+  module: ArrayBuffer;
+  trace: Uint8Array;
+  episode: Uint8Array;
+}
+
+/** Sides of views and map, pixels. */
+export interface Sizes {
+  viewPx: number;
+  mapPx: number;
+}
+
+/** Player in a worker. */
+export class ReplayPlayer {
+  private readonly worker: Worker;
+  private isBusy = false;
+  private next: number | undefined;
+  private agents: number[] = [];
+
+  /**
+   * Opens a replay. `sizes` returns the sizes of the next pictures. `onOpened` and `onFrame` receive the results, `onError` the reason if the replay
+   * cannot be shown.
+   */
+  constructor(
+    workerSource: string,
+    source: Source,
+    private readonly sizes: () => Sizes,
+    private readonly onOpened: (info: ReplayInfo) => void,
+    private readonly onFrame: (frame: DrawnFrame) => void,
+    private readonly onError: (message: string) => void,
+  ) {
+    const url = URL.createObjectURL(new Blob([workerSource], { type: "text/javascript" }));
+    this.worker = new Worker(url);
+    this.worker.onmessage = (event: MessageEvent<Response>) => this.receive(event.data);
+    this.worker.onerror = (event) => this.onError(event.message || "the worker has stopped");
+    URL.revokeObjectURL(url);
+    const { module, trace, episode } = source;
+    this.post({ type: "open", module, trace, episode });
+  }
+
+  /** Shows a frame, as soon as the worker is free. */
+  seek(frame: number): void {
+    this.next = frame;
+    this.drawNext();
+  }
+
+  /** True while a frame is drawn. */
+  get isDrawing(): boolean {
+    return this.isBusy;
+  }
+
+  /** Ends the worker. */
+  close(): void {
+    this.worker.terminate();
+  }
+
+  private post(request: Request): void {
+    this.isBusy = true;
+    this.worker.postMessage(request);
+  }
+
+  private drawNext(): void {
+    if (this.isBusy || this.next === undefined || this.agents.length === 0) return;
+    const frame = this.next;
+    this.next = undefined;
+    this.post({ type: "frame", frame, agents: this.agents, ...this.sizes() });
+  }
+
+  private receive(response: Response): void {
+    this.isBusy = false;
+    if (response.type === "opened") {
+      // Views of the partner and the helper.
+      this.agents = response.info.agents.map((agent) => agent.id).filter((id) => id < 2);
+      this.onOpened(response.info);
+    } else if (response.type === "frame") {
+      this.onFrame(response);
+    } else {
+      this.onError(response.message);
+    }
+    this.drawNext();
+  }
+}

@@ -12,9 +12,11 @@ use chaic_core::{Briefing, ClassId, EntityId, Observation, Outcome, Target};
 
 use crate::instances::Instance;
 use crate::labels::label_of;
-use crate::perception_registry::GT_NAMES;
 use crate::tracker::{Measurement, Tracker, TrackerConfig};
 use crate::trained::{DetectorInference, TrainedDetector};
+
+/// Name of the learned detector with ground-truth classes: it measures what wrong names cost.
+pub const GT_NAMES: &str = "gt_names";
 
 /// Creates perception with a trained detector.
 #[derive(Clone, Debug)]

@@ -12,7 +12,7 @@ use chaic_nn::weights::WeightsError;
 use crate::behavior::network::TrainedBehavior;
 use crate::behavior::recognize::LearnedBehaviorFactory;
 use crate::noisy::{DetectorNoiseModel, NoisyPerceptionFactory};
-use crate::perception::LearnedPerceptionFactory;
+use crate::perception::{GT_NAMES, LearnedPerceptionFactory};
 use crate::trained::TrainedDetector;
 
 /// Name of the learned models; `learned:FILE` reads other weights.
@@ -21,10 +21,8 @@ pub const LEARNED: &str = "learned";
 /// rates.
 pub const NOISY: &str = "noisy";
 
-/// Name of the learned detector with ground-truth classes; `gt_names:FILE` reads other weights. With
-/// [`GT_MASKS`] it measures what errors of the detector's parts cost.
-pub const GT_NAMES: &str = "gt_names";
-/// Name of ground-truth masks and classes with learned tracks.
+/// Name of ground-truth masks and classes with learned tracks: it measures what errors of the tracker
+/// cost.
 pub const GT_MASKS: &str = "gt_masks";
 
 /// Maximum size of a file of weights or rates, bytes.

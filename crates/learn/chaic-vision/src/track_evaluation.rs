@@ -56,9 +56,10 @@ impl Rate {
         let sum = |k: usize| counts.clone().map(|c| c[k]).sum::<usize>();
         let (n, n_episodes) = (sum(1), counts.clone().count() as f64);
         let value = sum(0) as f64 / n.max(1) as f64;
-        let residuals = counts.clone().map(|[a, b]| (a as f64 - value * b as f64).powi(2));
+        let residuals = counts.clone().map(|[a, b]| a as f64 - value * b as f64);
         let correction = n_episodes / (n_episodes - 1.0).max(1.0);
-        let error = (correction * residuals.sum::<f64>()).sqrt() / n.max(1) as f64;
+        let squares: f64 = residuals.map(|residual| residual * residual).sum();
+        let error = (correction * squares).sqrt() / n.max(1) as f64;
         Rate { value, interval: 1.96 * error, n }
     }
 }

@@ -15,6 +15,7 @@ fn detection(track: TrackId, class: &str, at: [f32; 3]) -> Detection {
     Detection {
         track,
         class: ClassId::named(class),
+        confidence: 1.0,
         person: u16::try_from(track.0).ok().and_then(|e| EntityId(e).agent()),
         pixel: [0, 0],
         position_in_world: at.into(),

@@ -71,9 +71,12 @@ pub struct TrackerConfig {
 impl Default for TrackerConfig {
     fn default() -> TrackerConfig {
         TrackerConfig {
-            // Objects delivered by RHP in 16 episodes (`gen-standard:5000..5002`, `--track
+            // Scores: objects delivered by RHP in 16 episodes (`gen-standard:5000..5002`, `--track
             // hidden`): 54 with 0.2 and 0.45, 33 with 0.4 and 0.7, 50 with 0.1 and 0.25, 91 with
-            // ground-truth ids.
+            // ground-truth ids. Extents and carried objects: `chaic eval tracks --perception gt_masks
+            // --n-episodes 16`. With 0.6 extents between the visible parts of large objects, and 3 m
+            // for carried ones, the precision of memory was 0.75 with 1.32 identity switches per
+            // object; now it is 0.98 with 0.20.
             min_score: 0.2,
             birth_log_odds: 6.0,
             birth_score: 0.45,

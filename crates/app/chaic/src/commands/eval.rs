@@ -148,6 +148,7 @@ fn finish(run: &Run, format: OutputFormat, start: Instant) -> Result<ExitStatus>
         let (episode, helper) = (&example.key.episode, &example.key.helper);
         let replay = format!("chaic replay {path} {episode} --helper {helper} --out replay.mp4");
         more.push(("Replay", replay));
+        more.push(("View", format!("chaic view {path}")));
         more.push(("Verify", format!("chaic verify {path}")));
     }
     print_scores(format, &report, run.folder(), &more)?;

@@ -126,6 +126,20 @@ fn helpers_recognize_behavior_with_trained_weights() {
 }
 
 #[test]
+fn tracks_are_evaluated() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let tracks = ["eval", "tracks", "--n-episodes", "1", "--json", "tracks.json"];
+    let printed = run_ok(dir, &[&tracks[..], &["--perception", "gt_masks"]].concat());
+    assert!(printed.contains("precision of memory"), "{printed}");
+    let report = fs::read(dir.join("tracks.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_slice(&report).unwrap();
+    assert!(report["memory_recall"]["value"].as_f64().unwrap() > 0.8, "{report}");
+    let error = run_err(dir, &[&tracks[..], &["--perception", "perfect"]].concat());
+    assert!(error.contains("no perception `perfect`"), "{error}");
+}
+
+#[test]
 fn the_hidden_track_uses_images_alone_and_replays_show_detections() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();

@@ -18,6 +18,28 @@ const PICTURES: [&str; 8] = [
 ];
 
 #[test]
+fn a_page_contains_the_replays_of_a_run_and_runs_are_compared() {
+    let dir = short_episodes();
+    let at = dir.path();
+    run_ok(at, &EVAL);
+    assert!(run_ok(at, &["view", "run"]).contains("4 replays of"));
+    let page = fs::read_to_string(at.join("run/view.html")).expect("a text file");
+    assert_eq!(page.matches("class=\"chaic-replay\"").count(), 4);
+    assert!(page.contains("no_constraint/gen/0, rhp, seed 0"));
+    let one = ["view", "run", "gen/0", "--helper", "rhp", "--max", "1", "--out", "one.html"];
+    let out = output_of(at, &one);
+    assert!(text(&out.stdout).contains("1 replay of") && text(&out.stderr).contains("1 more"));
+    let error = run_err(at, &["view", "run", "obstacle/test/00"]);
+    assert!(error.contains("has no trace of obstacle/test/00"), "{error}");
+
+    run_ok(at, &[&EVAL[..5], &["--size", "64", "--out", "again"]].concat());
+    let table = run_ok(at, &["report", "run", "--baseline", "again"]);
+    assert!(table.contains("TR minus that in again") && table.contains("RHP"), "{table}");
+    let error = run_err(at, &["report", "run", "--baseline", "again", "--format", "csv"]);
+    assert!(error.contains("choose --format text or md"), "{error}");
+}
+
+#[test]
 fn images_and_episode_files() {
     let dir = short_episodes();
     let at = dir.path();

@@ -44,7 +44,7 @@ pub fn differences(played: PlayedEpisodes<'_>, helpers: &[String]) -> Vec<Differ
     let mut found = Vec::new();
     for (k, helper) in helpers.iter().enumerate() {
         for baseline in &helpers[..k] {
-            found.push(difference((&groups, helper), (&groups, baseline), played.environments));
+            found.push(difference((&groups, helper), (&groups, baseline), played.environments).0);
         }
     }
     found
@@ -58,16 +58,17 @@ pub fn run_differences(played: PlayedEpisodes<'_>, baseline: &[RunResult]) -> Ve
     let pairs = helpers.into_iter().map(|helper| {
         difference((&groups, helper), (&baseline_groups, helper), played.environments)
     });
-    pairs.filter(|difference| difference.all.is_some()).collect()
+    pairs.filter(|(_, n_episodes)| *n_episodes > 0).map(|(difference, _)| difference).collect()
 }
 
-/// Compares two helpers, each with the results of its run, on the episodes that both have.
+/// Compares two helpers, each with the results of its run, on the episodes that both have; also
+/// returns the number of these episodes.
 fn difference(
     (groups, helper): (&Groups<'_>, &str),
     (baseline_groups, baseline): (&Groups<'_>, &str),
     environments: &Environments,
-) -> Difference {
-    let mut tasks = BTreeMap::new();
+) -> (Difference, usize) {
+    let (mut tasks, mut n_episodes) = (BTreeMap::new(), 0);
     let mut all = Clusters::default();
     for (task, by_helper) in groups {
         let baseline_rates = baseline_groups.get(task).and_then(|row| rates(row, baseline));
@@ -76,13 +77,14 @@ fn difference(
         for (episode, rate) in a {
             let Some(baseline_rate) = b.get(episode) else { continue };
             let environment = environments.get(episode);
+            n_episodes += 1;
             in_task.add(*task, environment, rate - baseline_rate);
             all.add(*task, environment, rate - baseline_rate);
         }
         tasks.extend(in_task.interval().map(|interval| (*task, interval)));
     }
     let (helper, baseline) = (helper.to_owned(), baseline.to_owned());
-    Difference { helper, baseline, tasks, all: all.interval() }
+    (Difference { helper, baseline, tasks, all: all.interval() }, n_episodes)
 }
 
 /// Returns a helper's transport rates by episode, averaged over seeds.

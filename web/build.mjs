@@ -2,7 +2,14 @@
 // with the committed files instead.
 
 import { execFileSync } from "node:child_process";
-import { mkdtempSync, readFileSync, writeFileSync, mkdirSync } from "node:fs";
+import {
+  existsSync,
+  mkdirSync,
+  mkdtempSync,
+  readdirSync,
+  readFileSync,
+  writeFileSync,
+} from "node:fs";
 import { tmpdir } from "node:os";
 import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
@@ -22,6 +29,10 @@ const run = (program, args, env = {}) =>
 const flags = ["-Ctarget-feature=+simd128", `--remap-path-prefix=${root}=`];
 const home = process.env.CARGO_HOME ?? join(process.env.HOME ?? "", ".cargo");
 flags.push(`--remap-path-prefix=${home}=`);
+const registry = join(home, "registry/src");
+for (const index of existsSync(registry) ? readdirSync(registry) : []) {
+  flags.push(`--remap-path-prefix=${join(registry, index)}=`);
+}
 const triple = "wasm32-unknown-unknown";
 run("cargo", ["build", "--locked", "--profile", "web", "--target", triple, "-p", "chaic-web"], {
   CARGO_ENCODED_RUSTFLAGS: flags.join("\u001f"),

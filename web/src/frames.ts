@@ -9,7 +9,8 @@ export function clock(frame: number, framesPerSecond: number): string {
 /** Returns the nearest of these frames before or after a frame; undefined if there is none. */
 export function nearest(frames: number[], from: number, direction: 1 | -1): number | undefined {
   const candidates = frames.filter((frame) => Math.sign(frame - from) === direction);
-  return direction > 0 ? Math.min(...candidates, Infinity) : Math.max(...candidates, -Infinity);
+  if (candidates.length === 0) return undefined;
+  return direction > 0 ? Math.min(...candidates) : Math.max(...candidates);
 }
 
 /** Returns the index of the last line at or before a frame; -1 before the first. */

@@ -141,8 +141,8 @@ export class ChaicReplay extends LitElement {
 
   private jump(direction: 1 | -1): void {
     const frames = this.info?.timeline.story.map((line) => line.frame) ?? [];
-    const found = nearest(frames, this.frame, direction) ?? this.frame;
-    if (Number.isFinite(found)) this.seek(found);
+    const found = nearest(frames, this.frame, direction);
+    if (found !== undefined) this.seek(found);
   }
 
   private press(event: KeyboardEvent): void {

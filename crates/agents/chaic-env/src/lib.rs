@@ -3,9 +3,9 @@
 //! **What it is**: the place where agents and world meet. An [`Env`] has an [`AgentSlot`] for each person
 //! of an episode, controlled by an agent or by the caller. It renders the observations of agents whose
 //! action has ended, resolves the pixels in their actions, submits the actions, and emits
-//! [`trace::Record`]s. A [`Playback`] re-simulates a trace, to show or to verify it; [`narration`] describes it. [`helper_registry`]
-//! creates helpers by name; [`rules`] holds the rules of world and planners. An [`EnvBatch`] runs many
-//! environments in parallel.
+//! [`trace::Record`]s. A [`Playback`] re-simulates a trace, to show or to verify it; [`narration`]
+//! describes it in words. [`helper_registry`] creates helpers by name; [`rules`] holds the rules of world
+//! and planners. An [`EnvBatch`] runs many environments in parallel.
 //!
 //! A learner that controls the helper next to the rule-based partner of the task:
 //!

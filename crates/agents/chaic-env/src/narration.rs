@@ -4,12 +4,13 @@ use std::ops::Deref;
 
 use chaic_core::{Action, AgentId, EntityId, Outcome, ResolvedAction};
 use chaic_world::{EventKind, Setup};
+use serde::Serialize;
 
 use crate::playback::Playback;
 use crate::trace::Trace;
 
 /// Text about one agent's current activity.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Caption {
     /// Name of the agent.
     pub agent: String,

@@ -75,8 +75,8 @@ impl<T: Deref<Target = Trace>> Playback<T> {
         self.last_frame
     }
 
-    /// Returns the number of decisions so far. The state's digest was that of the trace at each of
-    /// them, if [`Playback::step`] was used.
+    /// Returns the number of decisions so far. [`Playback::step`] counts only those at which the
+    /// state's digest is that of the trace.
     pub fn n_decisions(&self) -> usize {
         self.n_submitted
     }
@@ -101,14 +101,16 @@ impl<T: Deref<Target = Trace>> Playback<T> {
         if self.world.is_over() || frame >= self.last_frame {
             return Ok(None);
         }
-        while let Some((choice, recorded)) = self.next_choice(|d| d.frame == frame) {
-            let digest = Digest(self.world.digest());
+        while let Some(next) = self.next_decision().filter(|next| next.frame == frame) {
+            let (digest, recorded) = (Digest(self.world.digest()), next.digest);
             if digest != recorded {
                 return Err(self.altered(format!(
                     "the state's digest is {recorded} in the trace, {digest} when played again"
                 )));
             }
-            let ChosenAction { agent, action, .. } = choice;
+            let Some(ChosenAction { agent, action, .. }) = self.next_choice(|_| true) else {
+                break;
+            };
             self.world.submit(agent, action).map_err(|e| self.altered(e.to_string()))?;
         }
         if let Some(late) = self.next_decision().map(|d| d.frame).filter(|late| *late <= frame) {
@@ -147,7 +149,7 @@ impl<T: Deref<Target = Trace>> Playback<T> {
     fn take_choices(&mut self, waiting: &[AgentId]) -> Vec<ChosenAction> {
         let frame = self.world.state().frame;
         let mut choices: Vec<ChosenAction> = Vec::new();
-        while let Some((choice, _)) = self.next_choice(|d| {
+        while let Some(choice) = self.next_choice(|d| {
             let is_waiting = waiting.contains(&d.agent);
             d.frame == frame && is_waiting && !choices.iter().any(|c| c.agent == d.agent)
         }) {
@@ -160,17 +162,17 @@ impl<T: Deref<Target = Trace>> Playback<T> {
         self.decisions.get(self.n_submitted).and_then(|next| decision(&self.trace, *next))
     }
 
-    /// Takes the next decision if it is this one, with the recorded digest; notes its thought.
-    fn next_choice(&mut self, is_it: impl Fn(&Decision) -> bool) -> Option<(ChosenAction, Digest)> {
+    /// Takes the next decision if it is this one, and notes its thought.
+    fn next_choice(&mut self, is_it: impl Fn(&Decision) -> bool) -> Option<ChosenAction> {
         let next = *self.decisions.get(self.n_submitted)?;
         let decision = decision(&self.trace, next).filter(|decision| is_it(decision))?;
-        let Decision { agent, action, digest, ref thought, .. } = *decision;
+        let Decision { agent, action, ref thought, .. } = *decision;
         let thought = thought.clone();
         if let (Some(thought), Some(slot)) = (&thought, self.thoughts.get_mut(agent.index())) {
             slot.clone_from(thought);
         }
         self.n_submitted += 1;
-        Some((ChosenAction { agent, action, thought, child: next.child }, digest))
+        Some(ChosenAction { agent, action, thought, child: next.child })
     }
 
     fn altered(&self, problem: String) -> EnvError {

@@ -87,26 +87,13 @@ pub struct FrameState {
     /// Frame.
     pub frame: Frame,
     /// Action and plan of each agent.
-    pub captions: Vec<AgentCaption>,
+    pub captions: Vec<Caption>,
     /// Achieved value of the goal.
     pub done: f64,
     /// Number of verified decisions so far.
     pub n_verified: usize,
     /// Belief of the helper, if it records one.
     pub belief: Option<PartnerBelief>,
-}
-
-/// Caption of one agent.
-#[derive(Clone, Debug, Serialize)]
-pub struct AgentCaption {
-    /// Name of the agent.
-    pub agent: String,
-    /// Current action.
-    pub action: String,
-    /// Current plan.
-    pub plan: String,
-    /// Last observed action of another agent, for agents that recognize actions.
-    pub last_observed: Option<String>,
 }
 
 /// Color image.
@@ -157,14 +144,7 @@ impl ReplayPlayer {
             }
         }
         let n_decisions = trace.decisions().count();
-        let info = ReplayInfo {
-            last_frame: playback.world().state().frame,
-            n_verified: playback.n_decisions().min(n_decisions),
-            n_decisions,
-            problem,
-            timeline,
-            ..ReplayInfo::new(&playback)
-        };
+        let info = ReplayInfo::new(&playback, n_decisions, problem, timeline);
         let current = keyframes[0].clone();
         Ok(ReplayPlayer { info, scene, current, keyframes })
     }
@@ -192,18 +172,17 @@ impl ReplayPlayer {
     /// Returns the state of the current frame.
     pub fn state(&self) -> FrameState {
         let world = self.current.world();
-        let caption = |agent: AgentId| {
-            let Caption { agent, action, plan, last_observed } = Caption::new(&self.current, agent);
-            AgentCaption { agent, action, plan, last_observed }
-        };
-        let helper = self.current.thoughts().get(AgentId::HELPER.index());
         FrameState {
             frame: world.state().frame,
-            captions: world.setup().agents().map(caption).collect(),
+            captions: world.setup().agents().map(|a| Caption::new(&self.current, a)).collect(),
             done: world.progress().0,
             n_verified: self.current.n_decisions(),
-            belief: helper.and_then(|thought| thought.belief.as_deref()).cloned(),
+            belief: self.belief().cloned(),
         }
+    }
+
+    fn belief(&self) -> Option<&PartnerBelief> {
+        self.current.thoughts().get(AgentId::HELPER.index())?.belief.as_deref()
     }
 
     /// Draws what an agent sees at the current frame, as a square image.
@@ -226,9 +205,7 @@ impl ReplayPlayer {
     pub fn draw_map(&self, width_px: u32) -> DrawnImage {
         let world = self.current.world();
         let mut map = floor_plan::draw_scene_plan(&self.scene, world, width_px);
-        let helper = self.current.thoughts().get(AgentId::HELPER.index());
-        let belief = helper.and_then(|thought| thought.belief.as_deref());
-        if let Some([x, z]) = belief.and_then(|belief| belief.position_cm) {
+        if let Some([x, z]) = self.belief().and_then(|belief| belief.position_cm) {
             let position = Vec2::new(0.01 * x as f32, 0.01 * z as f32);
             floor_plan::mark_believed_position(&mut map, world, AgentId::HELPER, position);
         }
@@ -237,7 +214,13 @@ impl ReplayPlayer {
 }
 
 impl ReplayInfo {
-    fn new(playback: &Playback<Arc<Trace>>) -> ReplayInfo {
+    /// Describes a replay, with a playback at the last frame that can be shown.
+    fn new(
+        playback: &Playback<Arc<Trace>>,
+        n_decisions: usize,
+        problem: Option<String>,
+        timeline: Timeline,
+    ) -> ReplayInfo {
         /// Frames per second of simulated time (docs/rules.md, time).
         const FRAMES_PER_SECOND: u32 = 30;
         let (header, world) = (playback.header(), playback.world());
@@ -262,14 +245,14 @@ impl ReplayInfo {
             chaic: header.chaic.clone(),
             agents: setup.agents().zip(&setup.people).map(agent).collect(),
             goal: goal.collect(),
-            last_frame: 0,
+            last_frame: world.state().frame,
             length: playback.last_frame(),
             frames_per_second: FRAMES_PER_SECOND,
             total: world.progress().1,
-            n_verified: 0,
-            n_decisions: 0,
-            problem: None,
-            timeline: Timeline::default(),
+            n_verified: playback.n_decisions(),
+            n_decisions,
+            problem,
+            timeline,
         }
     }
 }

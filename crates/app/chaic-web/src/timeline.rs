@@ -1,4 +1,4 @@
-//! What happens in an episode, for the timeline and the list of events of a page.
+//! Activities, events and deliveries of an episode, for the timeline and the list of events of a page.
 
 use chaic_core::{Action, AgentId, Frame, Outcome, ResolvedAction};
 use chaic_env::narration::event_text;

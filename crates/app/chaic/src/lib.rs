@@ -91,7 +91,7 @@ fn run_command(command: Command, format: OutputFormat, launcher: &Launcher) -> R
                 commands::perception::evaluate_behavior(arguments, format)
             }
             Some(ModelEvaluation::Tracks(arguments)) => {
-                commands::perception::evaluate_tracks_of(arguments, format)
+                commands::perception::evaluate_tracks(arguments, format)
             }
             Some(ModelEvaluation::Opponent(arguments)) => {
                 commands::opponent::evaluate(arguments, format)

@@ -99,26 +99,25 @@ pub fn find_trace(
     helper: Option<&str>,
     seed: Option<u32>,
 ) -> Result<PathBuf> {
-    let traces = folder.traces()?;
     let found = find_traces(folder, Some(episode), helper, seed)?;
-    let mut candidates: Vec<(usize, &PathBuf)> =
-        found.iter().map(|(path, helper)| (preference(helper), path)).collect();
-    candidates.sort();
-    candidates.first().map(|(_, p)| (*p).clone()).ok_or_else(|| {
-        let examples: Vec<String> = traces
-            .iter()
-            .take(3)
-            .filter_map(|p| Some(p.strip_prefix(folder.path()).ok()?.display().to_string()))
-            .collect();
-        let known = match traces.len() {
-            0 => "no traces at all".to_owned(),
-            n => format!("{n} traces, for example {}", examples.join(", ")),
-        };
-        let mut wanted = episode.to_owned();
-        wanted += &helper.map_or(String::new(), |h| format!(" with helper {h}"));
-        wanted += &seed.map_or(String::new(), |s| format!(" and seed {s}"));
-        EvalError::NoTrace { path: folder.path().to_owned(), wanted, known }
-    })
+    let candidates = found.into_iter().map(|(path, helper)| (preference(&helper), path));
+    if let Some((_, path)) = candidates.min() {
+        return Ok(path);
+    }
+    let traces = folder.traces()?;
+    let examples: Vec<String> = traces
+        .iter()
+        .take(3)
+        .filter_map(|p| Some(p.strip_prefix(folder.path()).ok()?.display().to_string()))
+        .collect();
+    let known = match traces.len() {
+        0 => "no traces at all".to_owned(),
+        n => format!("{n} traces, for example {}", examples.join(", ")),
+    };
+    let mut wanted = episode.to_owned();
+    wanted += &helper.map_or(String::new(), |h| format!(" with helper {h}"));
+    wanted += &seed.map_or(String::new(), |s| format!(" and seed {s}"));
+    Err(EvalError::NoTrace { path: folder.path().to_owned(), wanted, known })
 }
 
 /// Renders a trace as a video; returns the number of its frames. Draws masks over the helper's

@@ -24,6 +24,7 @@
 
 pub mod labels;
 mod parallel;
+mod structures;
 
 pub mod features;
 pub mod views;

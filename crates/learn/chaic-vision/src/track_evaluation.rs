@@ -2,7 +2,8 @@
 //! compared with ground-truth ids.
 //!
 //! The rule-based planner acts on the evaluated perception. Ids reach the evaluation only. Evaluated
-//! objects are movable objects and goal places, except for those that the helper has held.
+//! objects are movable objects and goal places. Objects that the helper has held are excluded from
+//! what it should remember.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -26,11 +27,10 @@ use chaic_episodes::{SeedRange, find_episode};
 use serde::Serialize;
 
 use crate::calibration::calibration_error;
+use crate::evaluate::MIN_AREA_PX;
 use crate::parallel::map_in_order;
 use crate::views::DatasetSplit;
 
-/// Minimum pixels of a visible object that should be detected, as in the evaluation of detectors.
-const MIN_AREA_PX: u32 = crate::evaluate::MIN_AREA_PX;
 /// Upper ends of the ranges of distance, meters. Objects are measured up to 10 m (facts A1.8).
 const RANGES_M: [u32; 4] = [2, 4, 7, 10];
 /// Number of seeds that are tried for an episode.
@@ -73,8 +73,8 @@ pub struct TrackReport {
     pub images: usize,
     /// Fraction of detections in an image that show an object of their class.
     pub detection_precision: Rate,
-    /// Fraction of objects of [`MIN_AREA_PX`](crate::evaluate::MIN_AREA_PX) pixels and more that are
-    /// detected with their class, by upper end of the range of distance in meters.
+    /// Fraction of objects of [`MIN_AREA_PX`] pixels and more that are detected with their class, by
+    /// upper end of the range of distance in meters.
     pub detection_recall_by_m: BTreeMap<u32, Rate>,
     /// The same for all distances up to 10 m.
     pub detection_recall: Rate,
@@ -98,7 +98,7 @@ pub struct TrackReport {
 pub struct ClassCounts {
     /// Objects seen with enough pixels, except for those that the helper has held.
     pub seen: usize,
-    /// Those of them that are in memory at the end.
+    /// Seen objects that are in memory at the end.
     pub remembered: usize,
     /// Objects in memory that were not seen at their place.
     pub false_memories: usize,
@@ -106,8 +106,8 @@ pub struct ClassCounts {
     pub identity_switches: usize,
 }
 
-/// Plays episodes of a split and evaluates the tracks. Tasks take turns. `progress` receives the
-/// number of played episodes. Returns `None` if `stop` is set meanwhile.
+/// Plays episodes of a split and evaluates the tracks. Tasks take turns. `progress` is called after
+/// each episode. Returns `None` if `stop` is set meanwhile.
 pub fn evaluate_tracks(
     perception: &dyn PerceptionFactory,
     split: DatasetSplit,
@@ -257,8 +257,8 @@ impl EpisodeRecord {
         matches
     }
 
-    /// Number of remembered objects, and of all objects seen with enough pixels, within a range of
-    /// distance.
+    /// Numbers of remembered objects, and of all objects seen with enough pixels, within a range of
+    /// distance, without those that the helper has held.
     fn memory_recall(&self, range_m: [f32; 2]) -> [usize; 2] {
         let matches = self.matches();
         let seen = self.objects.iter().filter(|(entity, object)| {

@@ -18,6 +18,7 @@ use self::plan_extent::PlanExtent;
 use crate::labels::{class_of, n_labels};
 use crate::loss::{exp, ln, sigmoid};
 
+// These constants were chosen by reasoning, not by measurement.
 /// Probability of each label that a detection does not name.
 const UNNAMED: f32 = 0.001;
 /// A detection whose label agrees with that of a track with a lower probability has another label.

@@ -73,6 +73,11 @@ fn an_altered_trace_is_shown_up_to_the_frame_that_differs() {
     let problem = info.problem.as_deref().unwrap_or_default();
     assert!(problem.contains("digest") || problem.contains("too late"), "{problem}");
     assert!(info.last_frame < 300 && info.length == 300 && info.n_verified < info.n_decisions);
+    // Neither the decision that differs nor a later one counts.
+    let (trace, _) = parse(altered.as_bytes(), Path::new("trace")).unwrap();
+    let n_before = trace.decisions().filter(|d| d.frame < info.last_frame).count();
+    let n_until = trace.decisions().filter(|d| d.frame <= info.last_frame).count();
+    assert!((n_before..n_until).contains(&info.n_verified), "{n_before} {n_until} {info:?}");
 }
 
 #[test]

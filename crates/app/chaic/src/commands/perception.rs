@@ -12,7 +12,7 @@ use chaic_vision::coco::{ANNOTATIONS, DETECTIONS, annotate, annotations_json, re
 use chaic_vision::evaluate::{DetectionReport, MIN_AREA_PX, MIN_FREQUENT_INSTANCES, report};
 use chaic_vision::instances::Instance;
 use chaic_vision::perception_registry::{read_behavior, read_detector};
-use chaic_vision::track_evaluation::{Rate, TrackReport, evaluate_tracks};
+use chaic_vision::track_evaluation::{self, Rate, TrackReport};
 use chaic_vision::trained::TrainedDetector;
 use chaic_vision::views::LabeledView;
 
@@ -75,15 +75,21 @@ pub fn evaluate_behavior(
 }
 
 /// Evaluates the tracks of a perception over whole held-out episodes.
-pub fn evaluate_tracks_of(arguments: &TracksArguments, format: OutputFormat) -> Result<ExitStatus> {
+pub fn evaluate_tracks(arguments: &TracksArguments, format: OutputFormat) -> Result<ExitStatus> {
     let perception = run_perception::perception_by_name(Some(&arguments.perception), None)?;
     let stop = interrupt::stop_flag()?;
     let bar = bars::count_bar(u64::from(arguments.n_episodes), "episodes");
     let (n_episodes, n_threads) = (arguments.n_episodes as usize, jobs(arguments.jobs));
     let progress = || bar.inc(1);
     let split = DatasetSplit::Test;
-    let report =
-        evaluate_tracks(perception.as_ref(), split, n_episodes, n_threads, &progress, stop);
+    let report = track_evaluation::evaluate_tracks(
+        perception.as_ref(),
+        split,
+        n_episodes,
+        n_threads,
+        &progress,
+        stop,
+    );
     bar.finish_and_clear();
     let Some(report) = report else { return Ok(ExitStatus::Interrupted) };
     print_result(format, &report, &tracks_text(&report, &arguments.perception))?;

@@ -1,7 +1,7 @@
 //! `chaic view`.
 
 use anyhow::{Result, bail};
-use chaic_eval::replay::find_traces;
+use chaic_eval::replay::{find_trace, find_traces};
 use chaic_eval::run::RunFolder;
 use chaic_files::write_atomically;
 use chaic_page::{PageReplay, replay_page};
@@ -30,9 +30,11 @@ pub fn run(arguments: &ViewArguments, format: OutputFormat) -> Result<ExitStatus
         replays.push((name, lines.join("\n") + "\n", episode));
     }
     if replays.is_empty() {
-        let episode = episode.as_ref().map_or(String::new(), |episode| format!(" of {episode}"));
+        if let Some(episode) = episode {
+            find_trace(&folder, episode, helper.as_deref(), None)?;
+        }
         let helper = helper.as_ref().map_or(String::new(), |helper| format!(" with {helper}"));
-        bail!("{} has no trace{episode}{helper}; `chaic show` lists what it has", run.display());
+        bail!("{} has no traces{helper}", run.display());
     }
     let pages: Vec<PageReplay<'_>> =
         replays.iter().map(|(name, trace, episode)| PageReplay { name, trace, episode }).collect();

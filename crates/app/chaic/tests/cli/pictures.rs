@@ -30,7 +30,9 @@ fn a_page_contains_the_replays_of_a_run_and_runs_are_compared() {
     let out = output_of(at, &one);
     assert!(text(&out.stdout).contains("1 replay of") && text(&out.stderr).contains("1 more"));
     let error = run_err(at, &["view", "run", "obstacle/test/00"]);
-    assert!(error.contains("has no trace of obstacle/test/00"), "{error}");
+    assert!(error.contains("obstacle/test/00") && error.contains("4 traces, for"), "{error}");
+    let error = run_err(at, &["view", "run", "--helper", "oracle"]);
+    assert!(error.contains("no traces with oracle"), "{error}");
 
     run_ok(at, &[&EVAL[..5], &["--size", "64", "--out", "again"]].concat());
     let table = run_ok(at, &["report", "run", "--baseline", "again"]);

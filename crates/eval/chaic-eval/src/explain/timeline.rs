@@ -2,12 +2,12 @@
 
 use chaic_core::agent::{PartnerBelief, Thought};
 use chaic_core::{Action, AgentId, EntityId, Frame, Outcome, ResolvedAction};
+use chaic_env::narration::object_name;
 use chaic_env::trace::{Record, Trace};
 use chaic_world::{EventKind, Setup};
 
 use super::{Change, ModeChange, Shift};
 use crate::recorded_belief::{Distribution, IDENTIFIED_PER_MILLE, most_likely, per_mille_of};
-use chaic_env::narration::object_name;
 
 /// Probabilities whose crossing is reported, per mille.
 const THRESHOLDS_PER_MILLE: [u16; 3] = [500, IDENTIFIED_PER_MILLE, 900];

@@ -4,6 +4,7 @@ use chaic_core::Vec3;
 use chaic_core::agent::BelievedObject;
 use chaic_core::geom::Camera;
 use chaic_core::observation::Images;
+use chaic_env::narration::Caption;
 use chaic_env::trace::Header;
 use chaic_render::text::{self, Align};
 use chaic_world::World;
@@ -14,7 +15,6 @@ use crate::replay::layout::{
     BAR, BAR_BACKGROUND, FAINT, HEIGHT_PX, INK, MARGIN_PX, SIDE_COLUMN_PX, SIDE_X_PX, VIEW_PX,
     WIDTH_PX, fill, wrapped,
 };
-use chaic_env::narration::Caption;
 
 const HEADER_PX: u32 = 44;
 const BACKGROUND: [u8; 3] = [250, 250, 248];

@@ -187,7 +187,7 @@ impl LearnedBehavior {
         }
     }
 
-    /// Returns the movable object nearest to a position that nobody holds.
+    /// Returns the nearest movable object that no person holds.
     fn nearest<'a>(&self, memory: &'a Memory, at: Vec3) -> Option<&'a MappedObject> {
         let is_held =
             |object: &MappedObject| memory.hands.all().any(|(track, _)| track == object.track);

@@ -1,8 +1,9 @@
 // Tests of the pages in Chromium: CHAIC names the command, CHROMIUM the browser.
 //
 // Promises: a page verifies its traces and uses no network; a frame looks the same however it is
-// reached; an altered trace is shown up to the frame that differs; everything works by keyboard; there
-// are no findings of axe at any width or color scheme.
+// reached; an altered trace is shown up to the frame that differs; everything works by keyboard; a report
+// has the scores of its run and opens its examples; a comparison shows where two runs diverge; there are
+// no findings of axe at any width or color scheme.
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
@@ -20,6 +21,7 @@ const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.mi
 const folder = mkdtempSync(join(tmpdir(), "chaic-web-"));
 const run = join(folder, "run");
 const view = join(folder, "view.html");
+const report = join(run, "report.html");
 
 let browser;
 
@@ -46,7 +48,7 @@ async function open(file, hash = "", options = {}) {
 
 const shown = (page) =>
   page.waitForFunction(() =>
-    document.querySelector("chaic-replay").shadowRoot.querySelector("figcaption b"),
+    document.querySelector("#player > *")?.shadowRoot.querySelector("figcaption b"),
   );
 
 /** Waits until a frame is drawn, and returns a digest of the pixels of all canvases. */
@@ -150,6 +152,128 @@ test("a damaged page says what is wrong", async () => {
   await page.close();
 });
 
+test("a report has the scores of its run, sorts them and opens its examples", async () => {
+  const { page, requests } = await open(report);
+  await shown(page);
+  assert.match(await page.locator(".lead").innerText(), /^With .+ of the goal is delivered; without helper/);
+  const link = await page.locator("a[download='scores.json']").getAttribute("href");
+  const { tasks } = JSON.parse(Buffer.from(link.split(",")[1], "base64").toString());
+  const [task] = Object.values(tasks);
+  const rates = () => page.locator("table.sortable").first().locator("tbody tr td.number:nth-child(3)").allInnerTexts();
+  const expected = Object.values(task).map((score) => score.tr.toFixed(2));
+  assert.deepEqual((await rates()).toSorted(), expected.toSorted());
+  const head = page.getByRole("button", { name: "TR", exact: true });
+  await head.focus();
+  for (const order of ["ascending", "descending"]) {
+    await page.keyboard.press("Enter");
+    assert.equal(await page.locator("th[aria-sort]").getAttribute("aria-sort"), order);
+    const sorted = expected.toSorted((a, b) => (order === "ascending" ? a - b : b - a));
+    assert.deepEqual(await rates(), sorted);
+  }
+  const example = page.locator(".examples a").first();
+  const [, frame] = /@(\d+)$/.exec(await example.getAttribute("href"));
+  await example.click();
+  await page.waitForFunction(
+    (wanted) => document.querySelector("chaic-replay")?.shown?.frame === wanted,
+    Number(frame),
+  );
+  for (const url of requests) assert.match(url, /^(file|blob|data):/);
+  await page.close();
+});
+
+test("a comparison shows both runs, and where they diverge", async () => {
+  const { page } = await open(report);
+  await page.locator(".examples a").nth(1).click();
+  await shown(page);
+  await page.waitForFunction(() => document.querySelector("chaic-compare")?.shown.filter(Boolean).length === 2);
+  const badges = await page.locator("chaic-compare .badge").allInnerTexts();
+  assert.equal(badges.filter((text) => text.startsWith("verified")).length, 2, badges.join());
+  await page.locator("chaic-compare .link").click();
+  const text = await page.locator("chaic-compare header").innerText();
+  const [, time] = /First different decision:\s+\d+:\d+\s[^]*?\(frame (\d+)\)/.exec(text);
+  const frame = await page.evaluate(() => document.querySelector("chaic-compare").frame);
+  assert.ok(frame <= Number(time) && frame > 0, `${frame} ${time}`);
+  // A hash of the trace's decisions would be equal before this frame: the views of the partner are.
+  const same = (at) =>
+    page.evaluate(async (wanted) => {
+      const compare = document.querySelector("chaic-compare");
+      compare.seek(wanted);
+      for (let n = 0; n < 5; ) {
+        const isDrawn = compare.shown.every((state) => state.frame === wanted);
+        n = isDrawn && !compare.players.some((player) => player.isDrawing) ? n + 1 : 0;
+        await new Promise(requestAnimationFrame);
+      }
+      return compare.shown.map((state) => state.captions[0].action);
+    }, at);
+  const [a, b] = await same(frame);
+  assert.equal(a, b, "the partner does the same up to the first different decision");
+  await page.locator("#other").selectOption("");
+  await page.waitForFunction(() => document.querySelector("chaic-replay")?.shown);
+  await page.close();
+});
+
+/** Selects the first plan by its key until a frame. */
+async function playTo(page, frame) {
+  await page.waitForFunction(
+    (until) => {
+      const play = document.querySelector("chaic-play");
+      if (play?.shown?.status === "waiting") {
+        play.shadowRoot.querySelector("section").dispatchEvent(new KeyboardEvent("keydown", { key: "1" }));
+      }
+      return play?.shown?.frame >= until;
+    },
+    frame,
+    { timeout: 60_000, polling: 30 },
+  );
+}
+
+/** Stops the game, downloads its trace and verifies it on the command line. */
+async function verified(page, name) {
+  await page.getByRole("button", { name: "Stop here" }).click();
+  const [download] = await Promise.all([
+    page.waitForEvent("download"),
+    page.getByRole("link", { name: "Download the trace" }).click(),
+  ]);
+  const file = join(folder, name);
+  await download.saveAs(file);
+  const text = execFileSync(chaic, ["verify", file, "--format", "json"], { encoding: "utf8" });
+  assert.equal(JSON.parse(text).passed, true);
+  return readFileSync(file, "utf8");
+}
+
+test("a game played by keyboard verifies on the command line, and can be watched", async () => {
+  const game = join(folder, "play.html");
+  execFileSync(chaic, ["play", "low_target/test/00", "--out", game]);
+  const { page, requests } = await open(game);
+  await page.getByLabel("Speed").selectOption("8");
+  await page.getByRole("button", { name: "Start" }).focus();
+  await page.keyboard.press("Enter");
+  await playTo(page, 150);
+  const text = await page.locator("chaic-play header").innerText();
+  assert.match(text, /wants something that you do not know/);
+  await page.evaluate(axe);
+  const { violations } = await page.evaluate(() => window.axe.run());
+  assert.deepEqual(violations.map((v) => `${v.id}: ${v.nodes.map((n) => n.html).join(" ")}`), []);
+  const trace = await verified(page, "game.jsonl");
+  assert.match(trace, /"helper":"human"/);
+  await page.getByRole("button", { name: "Watch the replay" }).click();
+  await shown(page);
+  assert.match(await page.locator("chaic-replay .badge").innerText(), /^verified/);
+  for (const url of requests) assert.match(url, /^(file|blob|data):/);
+  await page.close();
+});
+
+test("a person takes over from a frame of a replay", async () => {
+  const { page } = await open(view, "#0@300");
+  await shown(page);
+  await pictures(page, 300);
+  await page.locator("chaic-replay .link", { hasText: "partner" }).click();
+  await playTo(page, 400);
+  const trace = await verified(page, "branch.jsonl");
+  assert.match(trace, /"partner":"human"/);
+  await page.close();
+});
+
 test("axe finds nothing, and nothing is wider than the page", async () => {
   for (const options of [
     { viewport: { width: 1280, height: 900 } },
@@ -157,14 +281,19 @@ test("axe finds nothing, and nothing is wider than the page", async () => {
     { viewport: { width: 1280, height: 900 }, colorScheme: "dark" },
     { viewport: { width: 360, height: 740 }, forcedColors: "active" },
   ]) {
-    const { page } = await open(view, "#1@900", options);
-    await shown(page);
-    await page.evaluate(axe);
-    const { violations } = await page.evaluate(() => window.axe.run());
-    const found = violations.map((v) => `${v.id}: ${v.nodes.map((n) => n.html).join(" ")}`);
-    assert.deepEqual(found, [], JSON.stringify(options));
-    const width = await page.evaluate(() => document.documentElement.scrollWidth);
-    assert.ok(width <= options.viewport.width, `${width} in ${JSON.stringify(options)}`);
-    await page.close();
+    for (const [file, hash] of [
+      [view, "#1@900"],
+      [report, "#1+0@900"],
+    ]) {
+      const { page } = await open(file, hash, options);
+      await shown(page);
+      await page.evaluate(axe);
+      const { violations } = await page.evaluate(() => window.axe.run());
+      const found = violations.map((v) => `${v.id}: ${v.nodes.map((n) => n.html).join(" ")}`);
+      assert.deepEqual(found, [], JSON.stringify(options));
+      const width = await page.evaluate(() => document.documentElement.scrollWidth);
+      assert.ok(width <= options.viewport.width, `${width} in ${JSON.stringify(options)}`);
+      await page.close();
+    }
   }
 });

@@ -10,6 +10,21 @@ declare module "*/chaic_web.js" {
     free(): void;
   }
 
+  export class Live {
+    constructor(episode: Uint8Array, config: string);
+    static take_over(trace: Uint8Array, episode: Uint8Array, frame: number, config: string): Live;
+    info(): string;
+    advance(frames: number): void;
+    state(): string;
+    choose_plan(index: number): boolean;
+    act(action: string): boolean;
+    trace(): string;
+    view(side: number): Picture;
+    free(): void;
+  }
+
+  export function reference_rate(episode: Uint8Array, helper: string, seed: number): number;
+
   export class Player {
     constructor(trace: Uint8Array, episode: Uint8Array);
     info(): string;

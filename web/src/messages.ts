@@ -34,6 +34,13 @@ export interface AgentInfo {
   strength_kg: number;
 }
 
+/** Decision in words. */
+export interface DecisionLine {
+  frame: number;
+  agent: number;
+  text: string;
+}
+
 /** Facts about a replay that do not change. */
 export interface ReplayInfo {
   task: string;
@@ -51,6 +58,10 @@ export interface ReplayInfo {
   n_decisions: number;
   problem: string | null;
   timeline: { activities: Activity[]; story: StoryLine[]; deliveries: Delivery[] };
+  decisions: DecisionLine[];
+  trail_interval: number;
+  /** Positions of each agent, in widths of the map from its left and upper edge. */
+  trails: [number, number][][];
 }
 
 /** Belief about the partner; probabilities per mille. */
@@ -76,13 +87,68 @@ export interface Picture {
   rgba: Uint8ClampedArray<ArrayBuffer>;
 }
 
+/** Level of a person's decisions. */
+export type InputLevel = "plans" | "steps";
+
+/** What is played, and by whom. */
+export interface LiveConfig {
+  seed: number;
+  /** Agent that the person controls: 0 is the partner, 1 the helper. */
+  seat: number;
+  level: InputLevel;
+  /** Helper if the person is the partner. */
+  helper: string;
+}
+
+/** Facts about a played episode that do not change. */
+export interface LiveInfo {
+  task: string;
+  episode: string;
+  /** Empty for a person who must find out. */
+  goal: string[];
+  person: string;
+  reach_m: [number, number];
+  strength_kg: number;
+}
+
+/** State of a played episode. */
+export interface LiveState {
+  frame: number;
+  horizon: number;
+  status: "running" | "waiting" | "ended";
+  plans: string[];
+  hands: [string | null, string | null];
+  failure: string | null;
+  caption: { action: string; plan: string };
+  /** Achieved and total value of the goal; null for a person who helps, until the end. */
+  progress: [number, number] | null;
+  events: StoryLine[];
+}
+
+/** Action of a person, as in a trace. */
+export type Action = string | Record<string, unknown>;
+
 /** Message to the worker. */
 export type Request =
   | { type: "open"; module: ArrayBuffer; trace: Uint8Array; episode: Uint8Array }
-  | { type: "frame"; frame: number; agents: number[]; viewPx: number; mapPx: number };
+  | { type: "frame"; frame: number; agents: number[]; viewPx: number; mapPx: number }
+  | { type: "play"; module: ArrayBuffer; episode: Uint8Array; config: LiveConfig; branch?: Branch }
+  | { type: "advance"; frames: number; viewPx: number; input?: { plan: number } | { action: Action } }
+  | { type: "trace" }
+  | { type: "reference"; helper: string };
+
+/** Trace and frame from which a person goes on. */
+export interface Branch {
+  trace: Uint8Array;
+  frame: number;
+}
 
 /** Message of the worker. */
 export type Response =
   | { type: "opened"; info: ReplayInfo }
-  | { type: "frame"; state: FrameState; views: Picture[]; map: Picture }
+  | { type: "frame"; state: FrameState; views: Picture[]; map: Picture | null }
+  | { type: "playing"; info: LiveInfo }
+  | { type: "live"; state: LiveState; view: Picture }
+  | { type: "trace"; trace: string }
+  | { type: "reference"; helper: string; rate: number }
   | { type: "error"; message: string };

@@ -1,12 +1,27 @@
-// Page of `chaic view`: a choice of replays, and the selected one. All data are in the page.
+// Page of `chaic view` and of the report of a run: sortable tables, a choice of replays, and the selected one or two. All data are in the
+// page.
 
+import "./compare.js";
+import type { ChaicCompare } from "./compare.js";
+import { startGame, type Pace } from "./game.js";
+import type { LiveConfig } from "./messages.js";
+import type { GameResult } from "./play.js";
+import type { Source } from "./player.js";
 import "./replay.js";
 import type { ChaicReplay } from "./replay.js";
+import { makeSortable } from "./sortable.js";
 
 /** Content of an embedded replay. */
 interface Embedded {
   trace: string;
   episode: string;
+}
+
+/** What the page shows: a replay, possibly beside another one, at a frame. */
+interface Shown {
+  replay: number;
+  other?: number;
+  frame: number;
 }
 
 const MODULE_ID = "chaic-module";
@@ -19,47 +34,154 @@ async function embedded(element: Element): Promise<ArrayBuffer> {
   return new Response(stream).arrayBuffer();
 }
 
-/** Position in the page's address: `#2@310` is frame 310 of the third replay. */
-function address(): { replay: number; frame: number } {
-  const [, replay, frame] = /^#(\d+)@(\d+)$/.exec(location.hash) ?? [];
-  return { replay: Number(replay ?? 0), frame: Number(frame ?? 0) };
+/** What the page's address names: `#2@310` is frame 310 of the third replay, `#2+0@310` the same beside the first. */
+function address(): Shown {
+  const [, replay, other, frame] = /^#(\d+)(?:\+(\d+))?@(\d+)$/.exec(location.hash) ?? [];
+  return {
+    replay: Number(replay ?? 0),
+    other: other === undefined ? undefined : Number(other),
+    frame: Number(frame ?? 0),
+  };
+}
+
+const moduleBytes = (): Promise<ArrayBuffer> => embedded(document.getElementById(MODULE_ID)!);
+const workerSource = (): string => document.getElementById(WORKER_ID)!.textContent!;
+const encoder = new TextEncoder();
+
+/** Replays of a page and the element that shows them. */
+class Replays {
+  private shown?: Shown;
+  private element?: ChaicReplay | ChaicCompare;
+  private pending = 0;
+
+  constructor(
+    private readonly contents: Element[],
+    private readonly choice: HTMLSelectElement,
+    private readonly other: HTMLSelectElement,
+    private readonly player: Element,
+  ) {
+    const choose = (frame: number, other?: number): void => {
+      void this.show({ replay: Number(choice.value), other, frame });
+    };
+    choice.addEventListener("change", () => choose(0));
+    other.addEventListener("change", () => {
+      choose(this.element?.frame ?? 0, other.value === "" ? undefined : Number(other.value));
+    });
+    addEventListener("hashchange", () => {
+      void this.show(address());
+      choice.scrollIntoView();
+    });
+  }
+
+  /** Shows what the address names. */
+  async show(wanted: Shown): Promise<void> {
+    const contents = [wanted.replay, wanted.other].filter((k) => k !== undefined).map((k) => this.contents[k]);
+    if (!contents.every((content) => content !== undefined)) return;
+    const isShown = this.shown?.replay === wanted.replay && this.shown.other === wanted.other;
+    this.shown = wanted;
+    if (isShown) {
+      this.element?.seek(wanted.frame);
+      return;
+    }
+    this.select(wanted);
+    const [first, second] = await Promise.all(contents.map((content) => this.source(content)));
+    const common = { workerSource: workerSource(), start: wanted.frame };
+    if (second) {
+      const element = document.createElement("chaic-compare") as ChaicCompare;
+      this.element = Object.assign(element, { sources: [first, second], ...common });
+    } else {
+      this.element = replayElement(first!, wanted.frame);
+    }
+    this.element.addEventListener("moved", (event) => this.moved((event as CustomEvent<number>).detail));
+    this.player.replaceChildren(this.element);
+  }
+
+  private async source(content: Element): Promise<Source> {
+    const { trace, episode }: Embedded = JSON.parse(new TextDecoder().decode(await embedded(content)));
+    return { module: await moduleBytes(), trace: encoder.encode(trace), episode: encoder.encode(episode) };
+  }
+
+  /** Selects a replay in the lists; the second list has the other runs of its episode and seed. */
+  private select({ replay, other }: Shown): void {
+    this.choice.value = String(replay);
+    const options = [...this.choice.options];
+    const place = options[replay]?.dataset.place;
+    const rivals = options.filter((option, k) => k !== replay && option.dataset.place === place);
+    this.other.replaceChildren(new Option("nothing", ""), ...rivals.map((option) => new Option(option.text, option.value)));
+    this.other.value = other === undefined ? "" : String(other);
+    this.other.disabled = rivals.length === 0;
+  }
+
+  private moved(frame: number): void {
+    // Browsers refuse frequent changes of the address.
+    clearTimeout(this.pending);
+    const { replay, other } = this.shown!;
+    const name = other === undefined ? replay : `${replay}+${other}`;
+    this.pending = window.setTimeout(() => history.replaceState(null, "", `#${name}@${frame}`), 300);
+  }
+}
+
+/** Creates the element of a replay, from which a person can take over. */
+function replayElement(source: Source, start: number): ChaicReplay {
+  const element = document.createElement("chaic-replay") as ChaicReplay;
+  element.addEventListener("take-over", (event) => {
+    const { frame, seat, seed } = (event as CustomEvent<{ frame: number; seat: number; seed: number }>).detail;
+    const config: LiveConfig = { seed, seat, level: "plans", helper: "none" };
+    void play(source.episode, config, { isLive: false, speed: 1 }, { trace: source.trace, frame });
+  });
+  return Object.assign(element, { source, workerSource: workerSource(), start });
+}
+
+/** Starts a game; its replay replaces the shown one when the person asks for it. */
+async function play(
+  episode: Uint8Array,
+  config: LiveConfig,
+  pace: Pace,
+  branch?: { trace: Uint8Array; frame: number },
+): Promise<void> {
+  const place = document.getElementById("play")!;
+  const module = await moduleBytes();
+  const watch = ({ trace }: GameResult): void => {
+    const element = replayElement({ module, trace: encoder.encode(trace), episode }, 0);
+    document.getElementById("player")!.replaceChildren(element);
+    element.scrollIntoView();
+  };
+  await startGame(place, { module, workerSource: workerSource(), episode, config, pace, branch }, watch);
+  place.scrollIntoView();
+}
+
+/** Starts the games that the form of a page describes. */
+function listen(form: HTMLFormElement): void {
+  const episodes = [...document.querySelectorAll("script.chaic-episode")];
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    const data = new FormData(form);
+    const value = (name: string): string => String(data.get(name));
+    const content = episodes[Number(value("episode"))];
+    if (!content) return;
+    const level = value("level") as LiveConfig["level"];
+    const config = { seed: 0, seat: Number(value("seat")), level, helper: value("helper") };
+    const pace = { isLive: value("pace") === "live", speed: Number(value("speed")) };
+    void embedded(content).then((episode) => play(new Uint8Array(episode), config, pace));
+  });
 }
 
 async function main(): Promise<void> {
-  const replays = [...document.querySelectorAll("script.chaic-replay")];
-  const player = document.querySelector("chaic-replay") as ChaicReplay;
-  const select = document.querySelector("select") as HTMLSelectElement;
-  const module = await embedded(document.getElementById(MODULE_ID)!);
-  player.workerSource = document.getElementById(WORKER_ID)!.textContent!;
-  const show = async (replay: number, frame: number): Promise<void> => {
-    const element = replays[replay];
-    if (!element) return;
-    select.value = String(replay);
-    const content: Embedded = JSON.parse(new TextDecoder().decode(await embedded(element)));
-    const encoder = new TextEncoder();
-    const [trace, episode] = [content.trace, content.episode].map((text) => encoder.encode(text));
-    player.start = frame;
-    player.source = { module, trace: trace!, episode: episode! };
-  };
-  let pending = 0;
-  player.addEventListener("moved", (event) => {
-    // Browsers refuse frequent changes of the address.
-    clearTimeout(pending);
-    const frame = (event as CustomEvent<number>).detail;
-    const hash = `#${select.value}@${frame}`;
-    pending = window.setTimeout(() => history.replaceState(null, "", hash), 300);
-  });
-  select.addEventListener("change", () => void show(Number(select.value), 0));
-  addEventListener("hashchange", () => {
-    const { replay, frame } = address();
-    if (String(replay) === select.value) player.seek(frame);
-    else void show(replay, frame);
-  });
-  const { replay, frame } = address();
-  await show(replay, frame);
+  const form = document.querySelector<HTMLFormElement>("#game");
+  if (form) listen(form);
+  document.querySelectorAll<HTMLTableElement>("table.sortable").forEach(makeSortable);
+  const contents = [...document.querySelectorAll("script.chaic-replay")];
+  const choice = document.querySelector<HTMLSelectElement>("#choice");
+  const other = document.querySelector<HTMLSelectElement>("#other");
+  const player = document.querySelector("#player");
+  if (!choice || !other || !player) return;
+  await new Replays(contents, choice, other, player).show(address());
 }
 
-void main().catch((problem: unknown) => {
+function fail(problem: unknown): void {
   const status = document.querySelector("[data-status]");
   if (status) status.textContent = `Cannot show the replays: ${String(problem)}`;
-});
+}
+
+addEventListener("unhandledrejection", (event) => fail(event.reason));
+void main().catch(fail);

@@ -6,7 +6,7 @@ import type { FrameState, Picture, ReplayInfo, Request, Response } from "./messa
 export interface DrawnFrame {
   state: FrameState;
   views: Picture[];
-  map: Picture;
+  map: Picture | null;
 }
 
 /** What a player needs. */
@@ -16,9 +16,13 @@ export interface Source {
   episode: Uint8Array;
 }
 
-/** Sides of views and map, pixels. */
-export interface Sizes {
+/** Pictures of a frame. */
+export interface Wanted {
+  /** Agents whose views are drawn. */
+  agents: number[];
+  /** Side of a view, pixels. */
   viewPx: number;
+  /** Width of the map, pixels; 0 for none. */
   mapPx: number;
 }
 
@@ -27,16 +31,16 @@ export class ReplayPlayer {
   private readonly worker: Worker;
   private isBusy = false;
   private next: number | undefined;
-  private agents: number[] = [];
+  private isOpen = false;
 
   /**
-   * Opens a replay. `sizes` returns the sizes of the next pictures. `onOpened` and `onFrame` receive the results, `onError` the reason if the replay
-   * cannot be shown.
+   * Opens a replay. `wanted` returns what is drawn next. `onOpened` and `onFrame` receive the results, `onError` the reason if the replay cannot
+   * be shown.
    */
   constructor(
     workerSource: string,
     source: Source,
-    private readonly sizes: () => Sizes,
+    private readonly wanted: () => Wanted,
     private readonly onOpened: (info: ReplayInfo) => void,
     private readonly onFrame: (frame: DrawnFrame) => void,
     private readonly onError: (message: string) => void,
@@ -72,21 +76,20 @@ export class ReplayPlayer {
   }
 
   private drawNext(): void {
-    if (this.isBusy || this.next === undefined || this.agents.length === 0) return;
+    if (this.isBusy || this.next === undefined || !this.isOpen) return;
     const frame = this.next;
     this.next = undefined;
-    this.post({ type: "frame", frame, agents: this.agents, ...this.sizes() });
+    this.post({ type: "frame", frame, ...this.wanted() });
   }
 
   private receive(response: Response): void {
     this.isBusy = false;
     if (response.type === "opened") {
-      // Views of the partner and the helper.
-      this.agents = response.info.agents.map((agent) => agent.id).filter((id) => id < 2);
+      this.isOpen = true;
       this.onOpened(response.info);
     } else if (response.type === "frame") {
       this.onFrame(response);
-    } else {
+    } else if (response.type === "error") {
       this.onError(response.message);
     }
     this.drawNext();

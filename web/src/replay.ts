@@ -1,25 +1,17 @@
 // Element <chaic-replay>: one replay with views, map, timeline and list of events.
 
-import { html, LitElement, nothing, svg, type PropertyValues, type TemplateResult } from "lit";
+import { html, LitElement, nothing, type PropertyValues, type TemplateResult } from "lit";
 import { property, query, queryAll, state } from "lit/decorators.js";
-import { clock, lastBefore, nearest } from "./frames.js";
-import type { Belief, FrameState, Picture, ReplayInfo } from "./messages.js";
-import { ReplayPlayer, type DrawnFrame, type Sizes, type Source } from "./player.js";
+import { PlaybackClock } from "./clock.js";
+import { controls } from "./controls.js";
+import { clock, lastBefore } from "./frames.js";
+import { badge } from "./badge.js";
+import type { AgentInfo, Belief, FrameState, ReplayInfo } from "./messages.js";
+import { drawnSize, MAX_PX, paint } from "./pictures.js";
+import { ReplayPlayer, type DrawnFrame, type Source, type Wanted } from "./player.js";
 import { styles } from "./styles.js";
 import { timeline } from "./timeline.js";
 
-const SPEEDS = [0.5, 1, 2, 4, 8];
-/** Largest sides of views and map, pixels. Views have at most the size that helpers see. */
-const MAX_PX = { view: 512, map: 720 };
-/** Shapes of the buttons, in a square of 20 units. */
-const ICONS = {
-  previous: "M3 3h3v14H3z M17 3v14L7 10z",
-  back: "M15 3v14L5 10z",
-  play: "M5 3v14l12-7z",
-  pause: "M4 3h4v14H4z M12 3h4v14h-4z",
-  forward: "M5 3v14l10-7z",
-  next: "M14 3h3v14h-3z M3 3v14l10-7z",
-};
 /** Largest number of hypotheses of a belief that are listed. */
 const MAX_BARS = 5;
 
@@ -36,17 +28,17 @@ export class ChaicReplay extends LitElement {
 
   @state() private info?: ReplayInfo;
   @state() private shown?: FrameState;
-  @state() private frame = 0;
-  @state() private isPlaying = false;
-  @state() private speed = 1;
   @state() private problem?: string;
 
   @queryAll("canvas.view") private viewCanvases!: NodeListOf<HTMLCanvasElement>;
   @query("canvas.map") private mapCanvas?: HTMLCanvasElement;
 
   private player?: ReplayPlayer;
-  private lastTime = 0;
-  private position = 0;
+  private readonly playback = new PlaybackClock(
+    this,
+    (frame) => this.moved(frame),
+    () => this.player?.isDrawing ?? true,
+  );
 
   private width = 0;
   // Redraws in the new size; the height depends on the content.
@@ -64,7 +56,6 @@ export class ChaicReplay extends LitElement {
   override disconnectedCallback(): void {
     super.disconnectedCallback();
     this.resizes.disconnect();
-    this.isPlaying = false;
     this.player?.close();
     this.player = undefined;
   }
@@ -75,94 +66,48 @@ export class ChaicReplay extends LitElement {
 
   /** Shows a frame and stops. */
   seek(frame: number): void {
-    this.isPlaying = false;
-    this.show(frame);
+    this.playback.seek(frame);
+  }
+
+  /** Shown frame. */
+  get frame(): number {
+    return this.playback.frame;
   }
 
   private open(source: Source): void {
     this.player?.close();
     this.info = this.shown = this.problem = undefined;
-    this.isPlaying = false;
+    this.playback.reset();
     const opened = (info: ReplayInfo): void => {
       this.info = info;
       this.problem = info.problem ?? undefined;
+      const events = info.timeline.story.map((line) => line.frame);
+      this.playback.reset({ last: info.last_frame, perSecond: info.frames_per_second, events });
       // The size of the pictures is known after the layout.
-      void this.updateComplete.then(() => this.show(this.start));
+      void this.updateComplete.then(() => this.seek(this.start));
       this.dispatchEvent(new CustomEvent("opened", { detail: info }));
     };
     const failed = (message: string): void => {
       this.problem = message;
     };
     const drawn = (frame: DrawnFrame): void => this.draw(frame);
-    const sizes = (): Sizes => ({
+    const wanted = (): Wanted => ({
+      agents: viewers(this.info).map((agent) => agent.id),
       viewPx: drawnSize(this.viewCanvases[0], MAX_PX.view),
       mapPx: drawnSize(this.mapCanvas, MAX_PX.map),
     });
-    this.player = new ReplayPlayer(this.workerSource, source, sizes, opened, drawn, failed);
+    this.player = new ReplayPlayer(this.workerSource, source, wanted, opened, drawn, failed);
   }
 
-  private show(frame: number): void {
-    if (!this.info) return;
-    this.frame = Math.max(0, Math.min(Math.round(frame), this.info.last_frame));
-    this.position = this.frame;
-    this.player?.seek(this.frame);
-    this.dispatchEvent(new CustomEvent("moved", { detail: this.frame }));
+  private moved(frame: number): void {
+    this.player?.seek(frame);
+    this.dispatchEvent(new CustomEvent("moved", { detail: frame }));
   }
 
   private draw({ state: shown, views, map }: DrawnFrame): void {
     this.shown = shown;
     views.forEach((picture, k) => paint(this.viewCanvases[k], picture));
-    paint(this.mapCanvas, map);
-  }
-
-  private toggle(): void {
-    if (!this.info) return;
-    if (this.frame >= this.info.last_frame) this.show(0);
-    this.isPlaying = !this.isPlaying;
-    this.lastTime = performance.now();
-    if (this.isPlaying) requestAnimationFrame((time) => this.advance(time));
-  }
-
-  private advance(time: number): void {
-    if (!this.isPlaying || !this.info) return;
-    // A tab in the background gets no callbacks; the replay goes on where it was.
-    const elapsed = Math.min(time - this.lastTime, 250) / 1000;
-    this.lastTime = time;
-    this.position += elapsed * this.speed * this.info.frames_per_second;
-    const frame = Math.min(Math.floor(this.position), this.info.last_frame);
-    if (frame !== this.frame && !this.player?.isDrawing) {
-      this.frame = frame;
-      this.player?.seek(frame);
-      this.dispatchEvent(new CustomEvent("moved", { detail: frame }));
-    }
-    if (this.frame >= this.info.last_frame) this.isPlaying = false;
-    else requestAnimationFrame((next) => this.advance(next));
-  }
-
-  private jump(direction: 1 | -1): void {
-    const frames = this.info?.timeline.story.map((line) => line.frame) ?? [];
-    const found = nearest(frames, this.frame, direction);
-    if (found !== undefined) this.seek(found);
-  }
-
-  private press(event: KeyboardEvent): void {
-    const target = event.composedPath()[0] as HTMLElement;
-    if (event.ctrlKey || event.altKey || event.metaKey || target.matches("select, input")) return;
-    const step = event.shiftKey ? (this.info?.frames_per_second ?? 30) : 1;
-    const actions: Record<string, () => void> = {
-      " ": () => this.toggle(),
-      ArrowLeft: () => this.seek(this.frame - step),
-      ArrowRight: () => this.seek(this.frame + step),
-      "[": () => this.jump(-1),
-      "]": () => this.jump(1),
-      Home: () => this.seek(0),
-      End: () => this.seek(this.info?.last_frame ?? 0),
-    };
-    const action = actions[event.key];
-    // A focused button handles the space bar itself.
-    if (!action || (event.key === " " && target.matches("button"))) return;
-    event.preventDefault();
-    action();
+    if (map) paint(this.mapCanvas, map);
   }
 
   override render(): TemplateResult {
@@ -170,9 +115,10 @@ export class ChaicReplay extends LitElement {
     if (!info) {
       return html`<p role="status">${this.problem ? `Cannot show this replay: ${this.problem}` : "Replaying ..."}</p>`;
     }
-    return html`<section aria-label="Replay" @keydown=${(event: KeyboardEvent) => this.press(event)}>
-      ${this.heading(info)} ${this.pictures(info)} ${this.controls(info)}
-      ${timeline(info, this.frame, (frame) => this.seek(frame))} ${legend()}
+    return html`<section aria-label="Replay" @keydown=${(event: KeyboardEvent) => this.playback.press(event)}>
+      ${this.heading(info)} ${this.pictures(info)}
+      ${controls(this.playback, info.last_frame, info.frames_per_second, this.status(info))}
+      ${timeline(info, this.frame, (frame) => this.seek(frame))} ${legend()} ${this.seats(info)}
       <div class="columns">${this.story(info)} ${this.belief(this.shown?.belief)}</div>
     </section>`;
   }
@@ -181,14 +127,11 @@ export class ChaicReplay extends LitElement {
     const partner = info.agents[0];
     const done = info.timeline.deliveries.at(-1)?.done ?? 0;
     const helper = info.helper === "none" ? "Nobody helps" : `The helper ${info.helper} helps`;
-    const verified = info.n_verified === info.n_decisions && !info.problem;
     return html`<header>
       <h2>${info.task}: the partner (${partner?.person ?? ""}) wants ${info.goal.join(", ")}</h2>
       <p>
         ${helper}; ${done} of ${info.total} delivered. ${limits(info)}
-        <span class="badge ${verified ? "good" : "bad"}">
-          ${verified ? "verified" : "not verified"}: ${info.n_verified} of ${info.n_decisions} decisions
-        </span>
+        ${badge(info)}
       </p>
       ${this.problem
         ? html`<p class="problem" role="alert">
@@ -200,7 +143,6 @@ export class ChaicReplay extends LitElement {
   }
 
   private pictures(info: ReplayInfo): TemplateResult {
-    const viewers = info.agents.filter((agent) => agent.id < 2);
     const caption = (id: number): TemplateResult | typeof nothing => {
       const found = this.shown?.captions[id];
       if (!found) return nothing;
@@ -208,7 +150,7 @@ export class ChaicReplay extends LitElement {
       return html`<b>${found.agent}</b>: ${found.action}<br />Plan: ${found.plan || "none"}${seen}`;
     };
     return html`<div class="pictures">
-      ${viewers.map(
+      ${viewers(info).map(
         (agent) => html`<figure class="a${agent.id}">
           <canvas class="view" width="384" height="384" role="img" aria-label="View of the ${agent.name}"></canvas>
           <figcaption>${caption(agent.id)}</figcaption>
@@ -221,41 +163,23 @@ export class ChaicReplay extends LitElement {
     </div>`;
   }
 
-  private controls(info: ReplayInfo): TemplateResult {
-    const fps = info.frames_per_second;
-    const button = (label: string, icon: keyof typeof ICONS, action: () => void): TemplateResult =>
-      html`<button type="button" aria-label=${label} title=${label} @click=${action}>
-        <svg viewBox="0 0 20 20" aria-hidden="true">${svg`<path d=${ICONS[icon]}></path>`}</svg>
-      </button>`;
-    const [toggle, toggleIcon] = this.isPlaying
-      ? (["Pause (space)", "pause"] as const)
-      : (["Play (space)", "play"] as const);
-    return html`<div class="controls" role="group" aria-label="Playback">
-      ${button("Previous event ([)", "previous", () => this.jump(-1))}
-      ${button("Previous frame (left arrow)", "back", () => this.seek(this.frame - 1))}
-      ${button(toggle, toggleIcon, () => this.toggle())}
-      ${button("Next frame (right arrow)", "forward", () => this.seek(this.frame + 1))}
-      ${button("Next event (])", "next", () => this.jump(1))}
-      <label>
-        Speed
-        <select @change=${(event: Event) => (this.speed = Number((event.target as HTMLSelectElement).value))}>
-          ${SPEEDS.map((speed) => html`<option value=${speed} ?selected=${speed === this.speed}>${speed}x</option>`)}
-        </select>
-      </label>
-      <label class="seek">
-        <span class="hidden">Frame</span>
-        <input
-          type="range"
-          min="0"
-          max=${info.last_frame}
-          .value=${String(this.frame)}
-          aria-valuetext="${clock(this.frame, fps)} of ${clock(info.length, fps)}"
-          @input=${(event: Event) => this.seek(Number((event.target as HTMLInputElement).value))}
-        />
-      </label>
-      <span class="time">${clock(this.frame, fps)} / ${clock(info.length, fps)}, frame ${this.frame}</span>
-      <span class="time">${this.shown?.done ?? 0} of ${info.total} delivered</span>
-    </div>`;
+  /** Offers to go on from the shown frame as a person. */
+  private seats(info: ReplayInfo): TemplateResult | typeof nothing {
+    const takeOver = (seat: number): void => {
+      this.playback.seek(this.frame);
+      this.dispatchEvent(new CustomEvent("take-over", { detail: { frame: this.frame, seat, seed: info.seed } }));
+    };
+    if (this.problem) return nothing;
+    return html`<p>
+      Take over from here as the
+      ${viewers(info).map(
+        ({ id, name }) => html`<button type="button" class="link" @click=${() => takeOver(id)}>${name}</button> `,
+      )}
+    </p>`;
+  }
+
+  private status(info: ReplayInfo): string {
+    return `${this.shown?.done ?? 0} of ${info.total} delivered`;
   }
 
   private story(info: ReplayInfo): TemplateResult {
@@ -303,6 +227,11 @@ export class ChaicReplay extends LitElement {
   }
 }
 
+/** Returns the agents whose views are drawn: partner and helper. */
+function viewers(info: ReplayInfo | undefined): AgentInfo[] {
+  return info?.agents.filter((agent) => agent.id < 2) ?? [];
+}
+
 /** Describes the limits of the partner. */
 function limits(info: ReplayInfo): string {
   const partner = info.agents[0];
@@ -311,29 +240,12 @@ function limits(info: ReplayInfo): string {
   return `The partner reaches from ${low} to ${high} m and lifts ${partner.strength_kg.toFixed(0)} kg.`;
 }
 
-/** Returns the side of the image that fills an element, in steps, pixels. */
-function drawnSize(element: HTMLElement | undefined, max: number): number {
-  const STEP = 64;
-  const side = (element?.clientWidth ?? 0) * devicePixelRatio;
-  return Math.min(Math.max(STEP * Math.ceil(side / STEP), STEP), max);
-}
-
 function legend(): TemplateResult {
   return html`<p class="legend">
     <span class="key walk"></span> walks <span class="key interact"></span> uses its hands
     <span class="key failed"></span> in vain (×) <span class="key wait"></span> waits
     <span class="key triangle">▼</span> delivery
   </p>`;
-}
-
-function paint(canvas: HTMLCanvasElement | undefined, { width, height, rgba }: Picture): void {
-  const context = canvas?.getContext("2d");
-  if (!canvas || !context) return;
-  if (canvas.width !== width || canvas.height !== height) {
-    canvas.width = width;
-    canvas.height = height;
-  }
-  context.putImageData(new ImageData(rgba, width, height), 0, 0);
 }
 
 customElements.define("chaic-replay", ChaicReplay);

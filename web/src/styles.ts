@@ -86,6 +86,83 @@ export const styles = css`
   figure.a1 canvas {
     border-top: 4px double var(--helper);
   }
+  .overlaid {
+    overflow: hidden;
+    position: relative;
+  }
+  .trails {
+    left: 0;
+    pointer-events: none;
+    position: absolute;
+    top: 0;
+    width: 100%;
+  }
+  .trails polyline {
+    fill: none;
+    stroke: var(--agent);
+    stroke-width: 0.005px;
+  }
+  .trails polyline.run1 {
+    stroke-dasharray: 0.02px 0.01px;
+  }
+  .trails circle {
+    fill: var(--agent);
+    stroke: #fff;
+    stroke-width: 0.003px;
+  }
+  .trails circle.run1 {
+    fill: #fff;
+    stroke: var(--agent);
+  }
+  .chart {
+    background: linear-gradient(var(--line), var(--line)) 0 50% / 100% 1px no-repeat;
+    border: solid var(--line);
+    border-width: 1px 0;
+    cursor: pointer;
+    display: block;
+    height: 6rem;
+    width: 100%;
+  }
+  .chart path {
+    fill: none;
+    stroke: var(--ink);
+    stroke-width: 2px;
+    vector-effect: non-scaling-stroke;
+  }
+  .chart path.run1 {
+    stroke-dasharray: 6px 4px;
+  }
+  .chart path.now {
+    stroke: var(--accent);
+  }
+  .plans {
+    margin: 0;
+    padding-left: 1.5rem;
+  }
+  .plans button {
+    background: transparent;
+    border: 1px solid var(--faint);
+    border-radius: 0.25rem;
+    color: inherit;
+    cursor: pointer;
+    font: inherit;
+    margin: 0.125rem 0;
+    min-height: 2.75rem;
+    padding: 0.25rem 0.75rem;
+    text-align: left;
+    width: 100%;
+  }
+  .link {
+    background: none;
+    border: 0;
+    color: var(--accent);
+    cursor: pointer;
+    font: inherit;
+    min-height: 1.75rem;
+    min-width: 1.75rem;
+    padding: 0;
+    text-decoration: underline;
+  }
   .controls {
     align-items: center;
     display: flex;

@@ -4,17 +4,18 @@ import { html, type TemplateResult } from "lit";
 import { styleMap } from "lit/directives/style-map.js";
 import type { Activity, ReplayInfo } from "./messages.js";
 
-/** Draws the timeline; `onSeek` receives the frame that a pointer selects. */
+/** Draws the timeline up to a frame `end`; `onSeek` receives the frame that a pointer selects. */
 export function timeline(
   info: ReplayInfo,
   frame: number,
   onSeek: (frame: number) => void,
+  end = info.length,
 ): TemplateResult {
   const { activities, deliveries } = info.timeline;
-  const percent = (at: number): string => `${((100 * at) / Math.max(info.length, 1)).toFixed(3)}%`;
+  const percent = (at: number): string => `${((100 * at) / Math.max(end, 1)).toFixed(3)}%`;
   const seek = (event: PointerEvent): void => {
     const box = (event.currentTarget as HTMLElement).getBoundingClientRect();
-    onSeek(((event.clientX - box.left) / box.width) * info.length);
+    onSeek(((event.clientX - box.left) / box.width) * end);
   };
   const bar = (activity: Activity): TemplateResult => {
     const isFailure = activity.failed && activity.kind === "interact";

@@ -96,10 +96,12 @@ impl<'a> EpisodeConfig<'a> {
                     perception: slot.agent().and_then(|agent| agent.perception()),
                     isolation: slot.agent().and_then(|agent| agent.isolation()),
                     weights: slot.agent().and_then(|agent| agent.weights()),
+                    input: None,
                 })
                 .collect(),
             renderer: "cpu".to_owned(),
             appearance: self.appearance,
+            branch_of: None,
         }
     }
 }

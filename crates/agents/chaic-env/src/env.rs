@@ -373,9 +373,7 @@ impl Env {
         until: Option<Frame>,
         sink: &mut dyn FnMut(&Record) -> std::result::Result<(), E>,
     ) -> std::result::Result<AdvanceOutcome, E> {
-        if let Some(error) = &self.failure {
-            return Err(error.clone().into());
-        }
+        self.check_failure()?;
         while !self.world.is_over() {
             let waiting = self.world.waiting();
             if !waiting.is_empty() {
@@ -383,18 +381,61 @@ impl Env {
                 if is_late || stop.load(Ordering::Relaxed) {
                     return Ok(AdvanceOutcome::Stopped);
                 }
-                self.open_turns(&waiting)?;
-                if waiting.iter().any(|a| self.turns[a.index()].choice.is_none()) {
+                if !self.submit_choices(&waiting, sink)? {
                     return Ok(AdvanceOutcome::NeedsAction);
                 }
-                let choices =
-                    waiting.iter().filter_map(|a| self.turns[a.index()].close()).collect();
-                submit_all(&mut self.world, choices, sink)?;
             }
             self.run_frames(sink)?;
         }
         sink(&Record::End(End::new(&self.world)))?;
         Ok(AdvanceOutcome::Ended)
+    }
+
+    /// Advances by one frame, for programs that show each frame; the records are those of [`Env::run`].
+    /// Returns [`AdvanceOutcome::Stopped`] after a frame that is not the last one.
+    ///
+    /// # Errors
+    /// The first error of `sink` or of an agent.
+    pub fn run_frame<E: From<AgentError>>(
+        &mut self,
+        sink: &mut dyn FnMut(&Record) -> std::result::Result<(), E>,
+    ) -> std::result::Result<AdvanceOutcome, E> {
+        self.check_failure()?;
+        let waiting = self.world.waiting();
+        if !self.world.is_over() {
+            if !waiting.is_empty() && !self.submit_choices(&waiting, sink)? {
+                return Ok(AdvanceOutcome::NeedsAction);
+            }
+            let Env { world, slots, renderer, turns, .. } = self;
+            world.tick();
+            record_histories(world, slots, renderer, turns);
+            step::record_events(world, sink)?;
+        }
+        if !self.world.is_over() {
+            return Ok(AdvanceOutcome::Stopped);
+        }
+        sink(&Record::End(End::new(&self.world)))?;
+        Ok(AdvanceOutcome::Ended)
+    }
+
+    fn check_failure<E: From<AgentError>>(&self) -> std::result::Result<(), E> {
+        self.failure.as_ref().map_or(Ok(()), |error| Err(error.clone().into()))
+    }
+
+    /// Lets the agents in the environment choose, and submits the actions of the waiting agents if all
+    /// have chosen. Returns false if an external agent has not.
+    fn submit_choices<E: From<AgentError>>(
+        &mut self,
+        waiting: &[AgentId],
+        sink: &mut dyn FnMut(&Record) -> std::result::Result<(), E>,
+    ) -> std::result::Result<bool, E> {
+        self.open_turns(waiting)?;
+        if waiting.iter().any(|a| self.turns[a.index()].choice.is_none()) {
+            return Ok(false);
+        }
+        let choices = waiting.iter().filter_map(|a| self.turns[a.index()].close()).collect();
+        submit_all(&mut self.world, choices, sink)?;
+        Ok(true)
     }
 
     /// Opens the turns of the waiting agents that have none yet. Agents in the environment choose here;
@@ -429,19 +470,23 @@ impl Env {
         sink: &mut dyn FnMut(&Record) -> std::result::Result<(), E>,
     ) -> std::result::Result<(), E> {
         let Env { world, slots, renderer, turns, .. } = self;
-        let on_frame = &mut |world: &World| {
-            for (k, (slot, turn)) in slots.iter().zip(turns.iter_mut()).enumerate() {
-                if let Some(history) = slot.sensors.frame_history {
-                    renderer.record_history(
-                        world,
-                        AgentId(k as u8),
-                        history,
-                        &mut turn.frame_history,
-                    );
-                }
-            }
-        };
-        step::advance(world, on_frame, sink)
+        world.advance_with_callback(&mut |world| record_histories(world, slots, renderer, turns));
+        step::record_events(world, sink)
+    }
+}
+
+/// Appends the current images to the frame histories of the agents that request one.
+fn record_histories(
+    world: &World,
+    slots: &[AgentSlot],
+    renderer: &ObservationRenderer,
+    turns: &mut [Turn],
+) {
+    for (k, (slot, turn)) in slots.iter().zip(turns).enumerate() {
+        if let Some(history) = slot.sensors.frame_history {
+            let agent = AgentId(k as u8);
+            renderer.record_history(world, agent, history, &mut turn.frame_history);
+        }
     }
 }
 

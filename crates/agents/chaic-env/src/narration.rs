@@ -2,12 +2,36 @@
 
 use std::ops::Deref;
 
+use chaic_core::agent::Thought;
 use chaic_core::{Action, AgentId, EntityId, Outcome, ResolvedAction};
-use chaic_world::{EventKind, Setup};
+use chaic_world::{EventKind, Setup, World};
 use serde::Serialize;
 
 use crate::playback::Playback;
 use crate::trace::Trace;
+
+/// Kind of activity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ActivityKind {
+    /// Walks or turns.
+    Walk,
+    /// Picks up, puts down or removes something.
+    Interact,
+    /// Waits.
+    Wait,
+}
+
+impl ActivityKind {
+    /// Returns the kind of an action.
+    pub fn of(action: &ResolvedAction) -> ActivityKind {
+        match action {
+            Action::Wait { .. } => ActivityKind::Wait,
+            action if action.is_locomotion() => ActivityKind::Walk,
+            _ => ActivityKind::Interact,
+        }
+    }
+}
 
 /// Text about one agent's current activity.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
@@ -25,8 +49,14 @@ pub struct Caption {
 impl Caption {
     /// Describes an agent at the current frame of a playback.
     pub fn new<T: Deref<Target = Trace>>(playback: &Playback<T>, agent: AgentId) -> Caption {
-        let setup = playback.world().setup();
-        let person = &playback.world().state().agents[agent.index()];
+        let thought = &playback.thoughts()[agent.index()];
+        Caption::of_agent(playback.world(), agent, &playback.header().helper, thought)
+    }
+
+    /// Describes an agent in a world with this helper, and its thought.
+    pub fn of_agent(world: &World, agent: AgentId, helper: &str, thought: &Thought) -> Caption {
+        let setup = world.setup();
+        let person = &world.state().agents[agent.index()];
         let action = match (&person.activity, &person.last) {
             (Some(activity), _) => action_text(setup, &activity.action),
             (None, Some((action, outcome))) => match outcome {
@@ -37,10 +67,9 @@ impl Caption {
             },
             (None, None) => "about to begin".to_owned(),
         };
-        let thought = &playback.thoughts()[agent.index()];
         let mode = thought.mode.as_ref().map_or(String::new(), |m| format!(" ({m})"));
         let name = match agent {
-            AgentId::HELPER => format!("{agent} ({})", playback.header().helper),
+            AgentId::HELPER => format!("{agent} ({helper})"),
             _ => agent.to_string(),
         };
         let last_observed = thought.last_observed.clone();

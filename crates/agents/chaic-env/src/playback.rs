@@ -12,7 +12,7 @@ use chaic_world::{Event, World};
 use crate::config::world_from_header;
 use crate::digest::Digest;
 use crate::error::{EnvError, Result};
-use crate::step::{ChosenAction, advance, submit_all};
+use crate::step::{ChosenAction, record_events, submit_all};
 use crate::trace::{Decision, Header, Record, Trace};
 
 /// Re-simulation of a trace: its decisions are submitted again to a world of the same setup.
@@ -140,7 +140,8 @@ impl<T: Deref<Target = Trace>> Playback<T> {
             Ok::<(), Infallible>(())
         };
         let Ok(()) = submit_all(&mut self.world, choices, &mut sink);
-        let Ok(()) = advance(&mut self.world, &mut |_| (), &mut sink);
+        self.world.advance();
+        let Ok(()) = record_events(&mut self.world, &mut sink);
         Some(records)
     }
 

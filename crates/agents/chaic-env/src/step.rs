@@ -45,17 +45,14 @@ pub(crate) fn submit_all<E>(
     Ok(())
 }
 
-/// Runs frames until an agent waits for an action or the episode ends, and passes the recorded
-/// events to `sink`. Calls `on_frame` after each frame.
+/// Passes the recorded events since the last call to `sink`.
 ///
 /// # Errors
 /// Those of `sink`.
-pub(crate) fn advance<E>(
+pub(crate) fn record_events<E>(
     world: &mut World,
-    on_frame: &mut dyn FnMut(&World),
     sink: &mut dyn FnMut(&Record) -> Result<(), E>,
 ) -> Result<(), E> {
-    world.advance_with_callback(on_frame);
     for event in world.drain_events().into_iter().filter(is_recorded) {
         sink(&Record::Event(TraceEvent::new(event, world)))?;
     }

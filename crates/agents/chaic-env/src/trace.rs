@@ -12,7 +12,7 @@ pub use record::{ChildRecord, Decision, End, Record, TraceEvent, is_recorded};
 
 use chaic_core::capability::{Impairments, Persona};
 use chaic_core::observation::{Grants, SensorConfig};
-use chaic_core::{AgentId, TaskId};
+use chaic_core::{AgentId, Frame, TaskId};
 use chaic_render::Appearance;
 use serde::{Deserialize, Serialize};
 
@@ -60,6 +60,19 @@ pub struct Header {
     /// Lighting and colors; absent for the canonical appearance.
     #[serde(default, skip_serializing_if = "is_canonical", with = "as_text")]
     pub appearance: Appearance,
+    /// Trace from which a person took over; absent for an episode that was played from its start.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub branch_of: Option<BranchPoint>,
+}
+
+/// Point of another trace from which an episode goes on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BranchPoint {
+    /// Digest of the bytes of the other trace.
+    pub trace: Digest,
+    /// First frame in which the decisions may differ.
+    pub frame: Frame,
 }
 
 // `skip_serializing_if` passes a reference.
@@ -128,6 +141,9 @@ pub struct Participant {
     /// Digest of its weights; absent for an agent without trained weights.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weights: Option<String>,
+    /// What a person decides who controls it: `plans` or `steps`; absent for a program.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub input: Option<String>,
 }
 
 /// A trace in memory.

@@ -157,6 +157,7 @@ fn write_report(run: &Run) -> Result<String, EvalError> {
     let progress = run.progress();
     if progress.finished == progress.total {
         write_files(run.folder(), &report)?;
+        chaic_page::write_report(run.folder(), &report)?;
     }
     Ok(if progress.finished > 0 { report.text(Format::Table) } else { String::new() })
 }

@@ -3,7 +3,9 @@
 use chaic_core::AgentId;
 use wasm_bindgen::prelude::*;
 
-use crate::player::{DrawnImage, ReplayPlayer};
+use crate::drawing::DrawnImage;
+use crate::live::{LiveSession, reference};
+use crate::player::ReplayPlayer;
 
 /// Player of one trace.
 #[wasm_bindgen]
@@ -66,6 +68,97 @@ impl Player {
     pub fn map(&self, width_px: u32) -> Picture {
         Picture { image: self.player.draw_map(width_px) }
     }
+}
+
+/// Episode that a person plays.
+#[wasm_bindgen]
+pub struct Live {
+    session: LiveSession,
+}
+
+#[wasm_bindgen]
+impl Live {
+    /// Starts an episode, with a [`crate::LiveConfig`] as JSON.
+    ///
+    /// # Errors
+    /// If one of them is unreadable, or an agent does not exist.
+    #[wasm_bindgen(constructor)]
+    pub fn new(episode: &[u8], config: &str) -> Result<Live, JsError> {
+        let config = serde_json::from_str(config).map_err(error)?;
+        Ok(Live { session: LiveSession::start(episode, &config).map_err(error)? })
+    }
+
+    /// Takes over from a frame of a trace.
+    ///
+    /// # Errors
+    /// If an input is unreadable, or the other agents do not act as in the trace.
+    pub fn take_over(
+        trace: &[u8],
+        episode: &[u8],
+        frame: u32,
+        config: &str,
+    ) -> Result<Live, JsError> {
+        let config = serde_json::from_str(config).map_err(error)?;
+        let session = LiveSession::take_over(trace, episode, frame, &config).map_err(error)?;
+        Ok(Live { session })
+    }
+
+    /// Returns [`crate::LiveInfo`].
+    ///
+    /// # Errors
+    /// Never in practice.
+    pub fn info(&self) -> Result<String, JsError> {
+        json(&self.session.info())
+    }
+
+    /// Advances by at most this many frames.
+    ///
+    /// # Errors
+    /// If an agent cannot decide.
+    pub fn advance(&mut self, n_frames: u32) -> Result<(), JsError> {
+        self.session.advance(n_frames).map(|_| ()).map_err(error)
+    }
+
+    /// Returns [`crate::LiveState`].
+    ///
+    /// # Errors
+    /// Never in practice.
+    pub fn state(&mut self) -> Result<String, JsError> {
+        json(&self.session.state())
+    }
+
+    /// Selects a plan of the last state; false if it does not exist.
+    pub fn choose_plan(&mut self, index: usize) -> bool {
+        self.session.choose_plan(index)
+    }
+
+    /// Performs an action (JSON); false if the person cannot decide now.
+    ///
+    /// # Errors
+    /// If it is no action.
+    pub fn act(&mut self, action: &str) -> Result<bool, JsError> {
+        let action = serde_json::from_str(action).map_err(error)?;
+        Ok(self.session.act(action))
+    }
+
+    /// Returns the trace so far.
+    pub fn trace(&self) -> String {
+        self.session.trace()
+    }
+
+    /// Draws what the person sees.
+    pub fn view(&self, side_px: u32) -> Picture {
+        Picture { image: self.session.draw_view(side_px) }
+    }
+}
+
+/// Returns the delivered fraction of the goal of an episode with a built-in helper.
+///
+/// # Errors
+/// If the episode is unreadable or the helper does not exist.
+#[wasm_bindgen]
+pub fn reference_rate(episode: &[u8], helper: &str, seed: u32) -> Result<f64, JsError> {
+    reference(episode, helper, seed).map_err(error)
 }
 
 #[wasm_bindgen]

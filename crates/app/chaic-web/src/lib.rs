@@ -1,16 +1,24 @@
-//! Replays in a browser: re-simulates a trace, draws it and describes it in words.
+//! Replays and play in a browser.
 //!
-//! **What it is**: the module that the pages of `chaic view` load. A [`ReplayPlayer`] replays the whole
-//! trace once when it is opened, compares the digest of each decision with the recorded one, and then
-//! shows any frame. `bindings` exports it to JavaScript.
+//! **What it is**: the module that the pages of chaic load. A [`ReplayPlayer`] replays the whole trace
+//! once when it is opened, compares the digest of each decision with the recorded one, and then shows
+//! any frame. A [`LiveSession`] runs an episode in which a person controls an agent, from the start or
+//! from a frame of a trace. `bindings` exports both to JavaScript.
 //!
 //! **What it is not**: it reads no files, uses no network and no threads, and contains no page; the
 //! elements of the page are in `web/`.
 
 #[cfg(target_arch = "wasm32")]
 mod bindings;
+mod drawing;
+mod live;
 mod player;
 mod timeline;
 
-pub use player::{DrawnImage, FrameState, PlayerError, ReplayInfo, ReplayPlayer};
-pub use timeline::{Activity, ActivityKind, Delivery, StoryLine, Timeline};
+pub use drawing::DrawnImage;
+pub use live::{
+    InputLevel, LiveConfig, LiveError, LiveInfo, LiveSession, LiveState, LiveStatus, PERSON,
+    reference,
+};
+pub use player::{DecisionLine, FrameState, PlayerError, ReplayInfo, ReplayPlayer};
+pub use timeline::{Activity, Delivery, StoryLine, Timeline};

@@ -4,18 +4,23 @@ use std::path::Path;
 use std::sync::Arc;
 
 use chaic_core::agent::PartnerBelief;
+use chaic_core::geom::to_xz;
 use chaic_core::{AgentId, Frame, Vec2};
-use chaic_env::narration::Caption;
-use chaic_env::trace::{Trace, parse};
+use chaic_env::narration::{Caption, action_text};
+use chaic_env::trace::{Decision, Trace, parse};
 use chaic_env::{EnvError, Playback};
 use chaic_episodes::{Episode, EpisodeError};
 use chaic_render::{Channels, Scene, View, floor_plan};
+use chaic_world::World;
 use serde::Serialize;
 
+use crate::drawing::DrawnImage;
 use crate::timeline::Timeline;
 
 /// Distance between stored states, frames: the time to any frame is that of this many frames.
 const KEYFRAME_INTERVAL: Frame = 100;
+/// Distance between the points of a trail, frames.
+const TRAIL_INTERVAL: Frame = 10;
 
 /// Reason why a replay cannot be opened or drawn.
 #[derive(Debug, thiserror::Error)]
@@ -64,6 +69,24 @@ pub struct ReplayInfo {
     pub problem: Option<String>,
     /// Activities, events and deliveries.
     pub timeline: Timeline,
+    /// Decisions in chronological order.
+    pub decisions: Vec<DecisionLine>,
+    /// Frames between the points of a trail.
+    pub trail_interval: Frame,
+    /// Positions of each agent on the map at multiples of `trail_interval`: distances from the left and
+    /// upper edge, relative to the width of the map.
+    pub trails: Vec<Vec<[f32; 2]>>,
+}
+
+/// Decision in words.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct DecisionLine {
+    /// Frame.
+    pub frame: Frame,
+    /// The agent.
+    pub agent: AgentId,
+    /// The action, for example `picks up apple #31`.
+    pub text: String,
 }
 
 /// Description of an agent.
@@ -96,17 +119,6 @@ pub struct FrameState {
     pub belief: Option<PartnerBelief>,
 }
 
-/// Color image.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct DrawnImage {
-    /// Width in pixels.
-    pub width: u32,
-    /// Height in pixels.
-    pub height: u32,
-    /// Red, green, blue and 255 of each pixel, row by row.
-    pub rgba: Vec<u8>,
-}
-
 /// Re-simulation of a trace with a movable position.
 pub struct ReplayPlayer {
     info: ReplayInfo,
@@ -129,6 +141,8 @@ impl ReplayPlayer {
         let mut playback = Playback::new(Arc::clone(&trace), &episode)?;
         let scene = Scene::with_appearance(playback.world().setup(), trace.header.appearance);
         let (mut keyframes, mut timeline) = (vec![playback.clone()], Timeline::default());
+        let mut trails = vec![Vec::new(); playback.world().state().agents.len()];
+        add_positions(&mut trails, playback.world());
         let mut problem = warnings.first().map(ToString::to_string);
         loop {
             match playback.step() {
@@ -139,12 +153,15 @@ impl ReplayPlayer {
                     break;
                 }
             }
-            if playback.world().state().frame.is_multiple_of(KEYFRAME_INTERVAL) {
+            let frame = playback.world().state().frame;
+            if frame.is_multiple_of(KEYFRAME_INTERVAL) {
                 keyframes.push(playback.clone());
             }
+            if frame.is_multiple_of(TRAIL_INTERVAL) {
+                add_positions(&mut trails, playback.world());
+            }
         }
-        let n_decisions = trace.decisions().count();
-        let info = ReplayInfo::new(&playback, n_decisions, problem, timeline);
+        let info = ReplayInfo::new(&playback, &trace, problem, timeline, trails);
         let current = keyframes[0].clone();
         Ok(ReplayPlayer { info, scene, current, keyframes })
     }
@@ -217,9 +234,10 @@ impl ReplayInfo {
     /// Describes a replay, with a playback at the last frame that can be shown.
     fn new(
         playback: &Playback<Arc<Trace>>,
-        n_decisions: usize,
+        trace: &Trace,
         problem: Option<String>,
         timeline: Timeline,
+        trails: Vec<Vec<[f32; 2]>>,
     ) -> ReplayInfo {
         /// Frames per second of simulated time (docs/rules.md, time).
         const FRAMES_PER_SECOND: u32 = 30;
@@ -235,6 +253,12 @@ impl ReplayInfo {
                 strength_kg: capability.strength_kg,
             }
         };
+        let decision = |decision: &Decision| DecisionLine {
+            frame: decision.frame,
+            agent: decision.agent,
+            text: action_text(setup, &decision.action),
+        };
+        let decisions: Vec<DecisionLine> = trace.decisions().map(decision).collect();
         let goal =
             setup.goal.targets.iter().map(|(class, n)| format!("{n} {}", class.info().label));
         ReplayInfo {
@@ -250,17 +274,22 @@ impl ReplayInfo {
             frames_per_second: FRAMES_PER_SECOND,
             total: world.progress().1,
             n_verified: playback.n_decisions(),
-            n_decisions,
+            n_decisions: decisions.len(),
             problem,
             timeline,
+            decisions,
+            trail_interval: TRAIL_INTERVAL,
+            trails,
         }
     }
 }
 
-impl DrawnImage {
-    fn from_rgb(width: u32, height: u32, rgb: &[u8]) -> DrawnImage {
-        let rgba = rgb.as_chunks::<3>().0.iter().flat_map(|[r, g, b]| [*r, *g, *b, u8::MAX]);
-        DrawnImage { width, height, rgba: rgba.collect() }
+/// Appends the current position of each agent to its trail.
+fn add_positions(trails: &mut [Vec<[f32; 2]>], world: &World) {
+    for (trail, agent) in trails.iter_mut().zip(&world.state().agents) {
+        let at = floor_plan::position_on_map(world, to_xz(agent.pose.position));
+        // Four decimals are less than a pixel, and shorter as JSON.
+        trail.push([at.x, at.y].map(|x| (1e4 * x).round() / 1e4));
     }
 }
 

@@ -1,31 +1,9 @@
 //! Activities, events and deliveries of an episode, for the timeline and the list of events of a page.
 
-use chaic_core::{Action, AgentId, Frame, Outcome, ResolvedAction};
-use chaic_env::narration::event_text;
+use chaic_core::{AgentId, Frame, Outcome};
+use chaic_env::narration::{ActivityKind, event_text};
 use chaic_world::{Event, EventKind, World};
 use serde::Serialize;
-
-/// Kind of activity, as the timeline colors it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ActivityKind {
-    /// Walks or turns.
-    Walk,
-    /// Picks up, puts down or removes something.
-    Interact,
-    /// Waits.
-    Wait,
-}
-
-impl ActivityKind {
-    fn of(action: &ResolvedAction) -> ActivityKind {
-        match action {
-            Action::Wait { .. } => ActivityKind::Wait,
-            action if action.is_locomotion() => ActivityKind::Walk,
-            _ => ActivityKind::Interact,
-        }
-    }
-}
 
 /// Time that an agent spends on one kind of activity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

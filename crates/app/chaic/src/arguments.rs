@@ -41,8 +41,8 @@ pub use self::perception::{
     TracksArguments, TrainArguments, TrainCommand,
 };
 pub use self::runs::{
-    ExplainArguments, MergeArguments, RenderArguments, ReplayArguments, ReportArguments,
-    ShowArguments, VerifyArguments, ViewArguments,
+    ExplainArguments, MergeArguments, PlayArguments, RenderArguments, ReplayArguments,
+    ReportArguments, ShowArguments, VerifyArguments, ViewArguments,
 };
 pub use self::tools::{CompletionsArguments, ListCommand, ManArguments};
 
@@ -112,6 +112,8 @@ pub enum Command {
     Replay(ReplayArguments),
     /// Write a page with replays for a browser: one file that needs no network.
     View(ViewArguments),
+    /// Write a page in which a person plays episodes, as partner or helper.
+    Play(PlayArguments),
     /// Render one frame of an episode: color, depth, ids, classes and normals.
     Render(RenderArguments),
     /// Export a scene for other programs.

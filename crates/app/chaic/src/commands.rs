@@ -15,6 +15,7 @@ pub mod llm;
 pub mod merge;
 pub mod opponent;
 pub mod perception;
+pub mod play;
 pub mod render;
 pub mod replay;
 pub mod report;

@@ -5,7 +5,8 @@
 //! [`metrics`] computes the paper's scores from the records, and [`report`] prints them. [`verify`]
 //! re-simulates traces and compares the records. [`replay`] and [`frame_export`] render episodes.
 //! [`explain`] describes a helper's belief in sentences, and [`calibration`] measures its quality.
-//! [`losses`] splits the difference between a helper and the upper bound by cause.
+//! [`losses`] splits the difference between a helper and the upper bound by cause. [`activity`] sums how
+//! agents spend their time, and [`examples`] selects episodes for a report.
 //! [`audit`] tests that hidden state does not influence agents.
 //!
 //! **What it is not**: it holds no rules of the world and makes no decisions for agents.
@@ -33,7 +34,9 @@ pub mod recorded_belief;
 pub mod report;
 pub mod run;
 
+pub mod activity;
 pub mod calibration;
+pub mod examples;
 pub mod explain;
 pub mod frame_export;
 pub mod losses;

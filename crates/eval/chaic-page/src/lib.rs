@@ -1,64 +1,90 @@
-//! Self-contained pages: replays with the module and the scripts that show them in one HTML file.
+//! Self-contained pages: the report of a run and its replays in one HTML file.
 //!
-//! **What it is**: [`replay_page`] embeds traces, episodes and the built bundle of `web/`. The page
-//! works from a file, offline, and verifies what it shows.
+//! **What it is**: [`page`] puts a [`RunSummary`], traces, episodes and the built bundle of `web/` into
+//! one file, which works offline and verifies what it shows. [`write_report`] writes the page of a run,
+//! [`play_page`] returns one in which a person plays.
 //!
-//! **What it is not**: it reads no run folders, draws nothing and knows no rules.
+//! **What it is not**: it plays nothing, draws nothing and knows no rules.
 
-use std::fmt::Write as _;
+mod replays;
+mod summary;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
+use chaic_env::RunKey;
+use chaic_episodes::Episode;
+use chaic_eval::report::Report;
+use chaic_eval::run::RunFolder;
+use minijinja::value::{Serde, Value};
+use minijinja::{Environment, context};
 use miniz_oxide::deflate::compress_to_vec;
 use serde_json::json;
+
+pub use replays::{PageReplay, read_replays};
+pub use summary::{ActivityRow, ExampleRow, Gain, RunSummary, ScoreRow, Span};
+
+/// Name of the page that a run writes into its folder.
+pub const REPORT_FILE: &str = "report.html";
 
 /// Compression level: the best one.
 const LEVEL: u8 = 9;
 
 const MODULE: &[u8] = include_bytes!("../bundle/chaic_web.wasm");
 const WORKER: &str = include_str!("../bundle/worker.js");
-const PAGE: &str = include_str!("../bundle/page.js");
+const SCRIPT: &str = include_str!("../bundle/page.js");
 const STYLE: &str = include_str!("page.css");
+/// The ending selects escaping for HTML.
+const TEMPLATE: (&str, &str) = ("page.html", include_str!("page.html"));
 
-/// Replay in a page.
-#[derive(Clone, Copy, Debug)]
-pub struct PageReplay<'a> {
-    /// Name in the list of replays.
-    pub name: &'a str,
-    /// Trace file (JSON lines).
-    pub trace: &'a str,
-    /// Episode file (JSON).
-    pub episode: &'a str,
+/// Writes the report of a run as a page into its folder: its scores, and replays of the examples. A
+/// damaged trace is shown up to its last complete record.
+///
+/// # Errors
+/// If a trace or an episode cannot be read, or the file cannot be written.
+pub fn write_report(folder: &RunFolder, report: &Report<'_>) -> chaic_eval::Result<()> {
+    let mut summary = RunSummary::new(folder, report)?;
+    let (replays, _) = read_replays(folder, report.options, &summary.example_traces(folder))?;
+    summary.link(&replays);
+    let title = format!("chaic: report of {}", folder.path().display());
+    folder.write(REPORT_FILE, page(&title, Some(&summary), &replays).as_bytes())
 }
 
-/// Returns an HTML page that shows the first of these replays and offers the others.
-pub fn replay_page(title: &str, replays: &[PageReplay<'_>]) -> String {
-    let title = escape(title);
-    let mut options = String::new();
-    let mut scripts = String::new();
-    for (k, replay) in replays.iter().enumerate() {
-        let _ = writeln!(options, "<option value=\"{k}\">{}</option>", escape(replay.name));
-        let content = json!({ "trace": replay.trace, "episode": replay.episode }).to_string();
-        let content = encoded(content.as_bytes());
-        let _ = writeln!(
-            scripts,
-            "<script type=\"text/plain\" class=\"chaic-replay\">{content}</script>"
-        );
-    }
-    let module = encoded(MODULE);
+/// Returns an HTML page with the report, if any, and the replays. The first replay is shown when the
+/// page opens.
+pub fn page(title: &str, report: Option<&RunSummary>, replays: &[PageReplay]) -> String {
+    let option =
+        |replay: &PageReplay| context! { name => replay.name.clone(), place => replay.place() };
+    let options: Vec<Value> = replays.iter().map(option).collect();
+    let contents: Vec<String> = replays.iter().map(PageReplay::content).collect();
+    let report = report.cloned().map(Serde);
+    render(context! { title, report, replays => options, contents })
+}
+
+/// Returns an HTML page in which a person plays one of these episodes, beside one of these helpers as the
+/// partner.
+pub fn play_page(title: &str, episodes: &[Episode], helpers: &[&str]) -> String {
+    let games: Vec<String> = episodes.iter().map(game_title).collect();
+    let contents: Vec<String> =
+        episodes.iter().map(|episode| encoded(episode.to_json_line().as_bytes())).collect();
+    let helpers: Vec<String> = helpers.iter().map(|name| (*name).to_owned()).collect();
+    render(context! { title, games, helpers, game_contents => contents })
+}
+
+/// Returns the name of an episode in the list of a page.
+fn game_title(episode: &Episode) -> String {
+    format!("{}: {}", episode.setup().task.info().title, episode.id())
+}
+
+/// Renders the template with these values, the scripts and the module.
+fn render(values: Value) -> String {
+    let mut environment = Environment::new();
+    let (name, source) = TEMPLATE;
+    environment.add_template(name, source).expect("the template is valid");
     // A closing tag in a script would end it.
-    let [worker, page] = [WORKER, PAGE].map(|script| script.replace("</script", "<\\/script"));
-    format!(
-        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<main>\n<h1>{title}</h1>\n\
-         <p><label>Replay <select>\n{options}</select></label></p>\n\
-         <p data-status role=\"status\"></p>\n<chaic-replay></chaic-replay>\n\
-         <noscript><p>This page needs JavaScript and WebAssembly.</p></noscript>\n</main>\n\
-         <script type=\"text/plain\" id=\"chaic-module\">{module}</script>\n\
-         <script type=\"text/plain\" id=\"chaic-worker\">{worker}</script>\n{scripts}\
-         <script>{page}</script>\n</body>\n</html>\n"
-    )
+    let [worker, script] = [WORKER, SCRIPT].map(|text| text.replace("</script", "<\\/script"));
+    let fixed = context! { worker, script, style => STYLE, module => encoded(MODULE) };
+    let template = environment.get_template(name).expect("it was added above");
+    template.render(context! { ..values, ..fixed }).expect("the template uses given values only")
 }
 
 /// Compresses bytes (raw deflate) and encodes them as base64.
@@ -66,31 +92,23 @@ fn encoded(bytes: &[u8]) -> String {
     STANDARD.encode(compress_to_vec(bytes, LEVEL))
 }
 
-/// Escapes text for HTML.
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+impl PageReplay {
+    /// Returns a text that replays of one episode and seed share.
+    fn place(&self) -> String {
+        let RunKey { task, episode, seed, .. } = &self.key;
+        format!("{task} {episode} {seed}")
+    }
+
+    /// Returns trace and episode as one encoded text.
+    fn content(&self) -> String {
+        encoded(json!({ "trace": self.trace, "episode": self.episode }).to_string().as_bytes())
+    }
+}
+
+/// Returns a link to a text file that is part of the page.
+fn data_link(media_type: &str, text: &str) -> String {
+    format!("data:{media_type};base64,{}", STANDARD.encode(text))
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_and_contents_cannot_add_markup() {
-        let evil = "</script><b onload=\"x\">&";
-        let replay = PageReplay { name: evil, trace: evil, episode: evil };
-        let page = replay_page(evil, &[replay, replay]);
-        assert!(!page.contains("<b onload"), "the text is escaped or encoded");
-        let n_scripts = page.matches("<script").count();
-        assert_eq!((n_scripts, page.matches("</script>").count()), (5, 5));
-        assert!(page.contains("<option value=\"1\">&lt;/script&gt;"));
-    }
-
-    #[test]
-    fn a_page_loads_nothing_from_elsewhere() {
-        let page = replay_page("title", &[]);
-        for forbidden in ["src=", "<link", "@import", "fetch(\"http"] {
-            assert!(!page.contains(forbidden), "{forbidden}");
-        }
-    }
-}
+mod tests;

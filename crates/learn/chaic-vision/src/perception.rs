@@ -168,6 +168,7 @@ impl Tracking {
         let segments = Segments { segment_ids: &segment_ids, depth_m, camera, kinds: &kinds };
         let (_, mut dynamic_mask) = segments.measure();
         self.tracker.mask_held(pose, depth_m, camera, STRIDE, &mut dynamic_mask);
+        self.tracker.mask_movables(depth_m, camera, STRIDE, &mut dynamic_mask);
         self.last = detections.iter().map(|d| (d.track, d.pixel)).collect();
         Percepts { detections, dynamic_mask, stride: STRIDE, hands: None }
     }

@@ -312,6 +312,36 @@ impl Tracker {
         }
     }
 
+    /// Sets a mask where the image shows points within large movable objects, also those that the
+    /// detector missed: the static map would keep them after the object has moved. The shape is that
+    /// of [`Tracker::mask_held`].
+    pub fn mask_movables(&self, depth_m: &[f32], camera: &Camera, stride: u32, mask: &mut [bool]) {
+        /// Distance around the extent in which points belong to the object, meters: points from above
+        /// are 0.125 m apart.
+        const MARGIN_M: f32 = 0.15;
+        /// Points below are floor, meters, and points above belong to no movable object.
+        const HEIGHT_M: [f32; 2] = [0.08, 2.0];
+        let is_known = |track: &&Track| {
+            let is_movable = pixel_kind(track.label) == PixelKind::Movable;
+            is_movable && !track.is_released && track.log_odds > self.config.report_log_odds
+        };
+        let extents: Vec<PlanExtent> =
+            self.tracks.iter().filter(is_known).filter_map(|track| track.extent).collect();
+        if extents.is_empty() {
+            return;
+        }
+        let (width, stride) = (camera.width as usize, stride as usize);
+        let columns = width.div_ceil(stride);
+        for (k, is_dynamic) in mask.iter_mut().enumerate().filter(|(_, is_dynamic)| !**is_dynamic) {
+            let (x, y) = (stride * (k % columns), stride * (k / columns));
+            let point = camera.unproject(x as u32, y as u32, depth_m[y * width + x]);
+            if point.y > HEIGHT_M[0] && point.y < HEIGHT_M[1] {
+                let at = Vec2::new(point.x, point.z);
+                *is_dynamic = extents.iter().any(|extent| extent.contains(at, MARGIN_M));
+            }
+        }
+    }
+
     fn match_people(
         &mut self,
         measurements: &[Measurement],

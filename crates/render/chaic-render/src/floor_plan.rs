@@ -65,6 +65,14 @@ pub fn mark_believed_position(
     circle(image, at, radius, stroke_px, person_color(believer));
 }
 
+/// Returns where a map of [`draw_scene_plan`] shows a position (x, z): the distances from its left and
+/// upper edge, relative to its width.
+pub fn position_on_map(world: &World, position_in_world: Vec2) -> Vec2 {
+    let area = map_area(world);
+    let map = Map { area, px_per_m: area.size().x.recip() };
+    map.px_from_xz(position_in_world)
+}
+
 /// Transform from meters to pixels.
 struct Map {
     area: Rect,

@@ -28,6 +28,7 @@ fn header() -> Header {
             perception: None,
             isolation: None,
             weights: None,
+            input: None,
             agent: AgentId::PARTNER,
             persona: Persona::Wheelchair,
             impairments: Impairments::new(Impairment::Tremor),
@@ -36,6 +37,7 @@ fn header() -> Header {
         }],
         renderer: "cpu".to_owned(),
         appearance: Appearance::Canonical,
+        branch_of: None,
     }
 }
 

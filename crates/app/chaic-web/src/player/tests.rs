@@ -7,7 +7,7 @@ use chaic_env::{Env, EpisodeConfig};
 use chaic_episodes::find_episode;
 
 use super::*;
-use crate::timeline::ActivityKind;
+use chaic_env::narration::ActivityKind;
 
 /// Plays the first frames of an episode; returns the trace and the episode as files.
 fn played(id: &str, helper: &str, n_frames: Frame) -> (String, String) {
@@ -56,6 +56,10 @@ fn a_frame_is_the_same_however_it_is_reached() {
         assert!(last.as_ref() == Some(&expected), "{path:?}");
     }
     assert_eq!(expected.1.rgba.len(), 4 * 64 * 64);
+    assert_eq!(info.decisions.len(), info.n_decisions);
+    assert_eq!(info.trails.iter().map(Vec::len).collect::<Vec<_>>(), [46; 3]);
+    let is_on_map = |[x, y]: &[f32; 2]| (0.0..1.0).contains(x) && (0.0..2.0).contains(y);
+    assert!(info.trails.iter().flatten().all(is_on_map));
     let activities = &info.timeline.activities;
     assert!(activities.iter().any(|a| a.agent == AgentId::PARTNER && a.kind == ActivityKind::Walk));
     assert!(activities.iter().all(|a| a.start <= a.end));

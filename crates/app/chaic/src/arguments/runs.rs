@@ -56,7 +56,7 @@ pub struct ShowArguments {
 /// `chaic verify`.
 #[derive(Args, Debug)]
 pub struct VerifyArguments {
-    /// Folder of the run.
+    /// Folder of the run, or a single trace (*.jsonl) of a bundled or generated episode.
     pub run: PathBuf,
     /// Traces in parallel, 1 to 1024 [default: one per core].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(ranges::JOBS))]
@@ -154,4 +154,15 @@ pub struct RenderArguments {
     /// Light and colors: canonical, evening, or varied:SEED for domain randomization.
     #[arg(long, value_name = "APPEARANCE", default_value = "canonical")]
     pub appearance: Appearance,
+}
+
+/// `chaic play`.
+#[derive(Args, Debug)]
+pub struct PlayArguments {
+    /// Ids of the episodes, for example obstacle/test/00 or shopping/gen/7 [default: the first test
+    /// episode of each of the eight tasks].
+    pub episodes: Vec<String>,
+    /// Page to write.
+    #[arg(long, value_name = "FILE", default_value = "play.html")]
+    pub out: PathBuf,
 }

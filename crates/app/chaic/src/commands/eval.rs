@@ -10,6 +10,7 @@ use chaic_eval::report::write_files;
 use chaic_eval::run::{FolderMode, Run, RunFolder, RunRequest, Shard};
 use chaic_learn::helpers::{NamedPolicy, PolicyRegistry};
 use chaic_llm::LanguageHelpers;
+use chaic_page::write_report;
 use chaic_sandbox::Launcher;
 use chaic_subprocess::{CommandRegistry, HelperProgram};
 
@@ -138,6 +139,7 @@ fn confined(
 fn finish(run: &Run, format: OutputFormat, start: Instant) -> Result<ExitStatus> {
     let report = report_of(run);
     write_files(run.folder(), &report)?;
+    write_report(run.folder(), &report)?;
     let path = quoted_path(run.folder().path());
     let secs = start.elapsed().as_secs();
     let mut more = vec![("Time", format!("{} min {:02} s", secs / 60, secs % 60))];

@@ -2,6 +2,7 @@
 
 use anyhow::Result;
 use chaic_eval::run::merge;
+use chaic_page::write_report;
 
 use super::summary::{print_scores, report_of};
 use crate::arguments::MergeArguments;
@@ -18,8 +19,10 @@ pub fn run(arguments: &MergeArguments, format: OutputFormat) -> Result<ExitStatu
         print_warning(&format!("{runs} of {} missing", extent.total));
     }
     if extent.finished > 0 {
-        // The merge has written the report.
-        print_scores(format, &report_of(&run), run.folder(), &[])?;
+        // The merge has written the other files of the report.
+        let report = report_of(&run);
+        write_report(run.folder(), &report)?;
+        print_scores(format, &report, run.folder(), &[])?;
     }
     Ok(ExitStatus::from_findings(missing > 0 || extent.errors > 0))
 }

@@ -1,9 +1,13 @@
 //! `chaic verify`.
 
+use std::path::Path;
+
 use anyhow::Result;
 use chaic_core::AgentId;
+use chaic_episodes::find_episode;
 use chaic_eval::run::RunFolder;
-use chaic_eval::verify::{Finding, Mismatch, ReportState, VerificationReport, verify_run};
+use chaic_eval::trace_file;
+use chaic_eval::verify::{Finding, Mismatch, ReportState, VerificationReport, verify, verify_run};
 use serde_json::json;
 
 use super::recorded::RecordedHelpers;
@@ -12,8 +16,11 @@ use crate::arguments::VerifyArguments;
 use crate::exit::ExitStatus;
 use crate::output::{OutputFormat, counted, print_result, print_warning};
 
-/// Replays the traces of a run and compares all that is recorded.
+/// Replays the traces of a run, or a single trace, and compares all that is recorded.
 pub fn run(arguments: &VerifyArguments, format: OutputFormat) -> Result<ExitStatus> {
+    if arguments.run.is_file() {
+        return verify_file(&arguments.run, format);
+    }
     let (folder, options) = RunFolder::read(&arguments.run)?;
     let bar = bars::count_bar(folder.traces()?.len() as u64, "traces");
     let progress = |done: usize| bar.set_position(done as u64);
@@ -22,19 +29,40 @@ pub fn run(arguments: &VerifyArguments, format: OutputFormat) -> Result<ExitStat
         verify_run(&folder, &options, &helpers.registry(), jobs(arguments.jobs), &progress);
     bar.finish_and_clear();
     let verdict = verdict?;
-    for warning in &verdict.warnings {
-        print_warning(&warning.to_string());
-    }
     if verdict.agreeing + verdict.mismatches.len() + verdict.findings.len() == 0 {
         anyhow::bail!("{} has no trace to verify", arguments.run.display());
+    }
+    print(&verdict, format)
+}
+
+fn print(verdict: &VerificationReport, format: OutputFormat) -> Result<ExitStatus> {
+    for warning in &verdict.warnings {
+        print_warning(&warning.to_string());
     }
     let differences: Vec<String> =
         verdict.mismatches.iter().map(|mismatch| format!("DIFFERS {mismatch}\n")).collect();
     let findings: Vec<String> =
         verdict.findings.iter().map(|finding| format!("FOUND {finding}\n")).collect();
-    let text = differences.concat() + &findings.concat() + &summary(&verdict) + "\n";
-    print_result(format, &to_json(&verdict), &text)?;
+    let text = differences.concat() + &findings.concat() + &summary(verdict) + "\n";
+    print_result(format, &to_json(verdict), &text)?;
     Ok(ExitStatus::from_findings(!verdict.is_good()))
+}
+
+/// Replays a trace that belongs to no run, such as that of a game in a browser.
+fn verify_file(path: &Path, format: OutputFormat) -> Result<ExitStatus> {
+    let (trace, warnings) = trace_file::read(path)?;
+    let episode = find_episode(&trace.header.episode)?;
+    let verdict = VerificationReport {
+        agreeing: 1,
+        decisions: trace.decisions().count(),
+        warnings,
+        ..VerificationReport::default()
+    };
+    let verdict = match verify(&trace, &episode, path)? {
+        Some(mismatch) => VerificationReport { agreeing: 0, mismatches: vec![mismatch], ..verdict },
+        None => verdict,
+    };
+    print(&verdict, format)
 }
 
 fn to_json(verdict: &VerificationReport) -> serde_json::Value {

@@ -1,10 +1,12 @@
 //! `chaic view`.
 
+use std::path::PathBuf;
+
 use anyhow::{Result, bail};
 use chaic_eval::replay::{find_trace, find_traces};
 use chaic_eval::run::RunFolder;
 use chaic_files::write_atomically;
-use chaic_page::{PageReplay, replay_page};
+use chaic_page::{page, read_replays};
 use serde_json::json;
 
 use crate::arguments::ViewArguments;
@@ -19,26 +21,18 @@ pub fn run(arguments: &ViewArguments, format: OutputFormat) -> Result<ExitStatus
     let ViewArguments { run, episode, out, helper, max } = arguments;
     let (folder, options) = RunFolder::read(run)?;
     let found = find_traces(&folder, episode.as_deref(), helper.as_deref(), None)?;
-    let mut replays: Vec<(String, String, String)> = Vec::new();
-    for (path, _) in found.iter().take(*max as usize) {
-        let (trace, warnings) = folder.read_trace(path)?;
-        warnings.iter().for_each(|warning| print_warning(&warning.to_string()));
-        let key = trace.header.key();
-        let name = format!("{}, {}, seed {}", key.episode, key.helper, key.seed);
-        let lines: Vec<String> = trace.lines().collect();
-        let episode = folder.episode(&options, &key)?.to_json_line();
-        replays.push((name, lines.join("\n") + "\n", episode));
-    }
-    if replays.is_empty() {
+    if found.is_empty() {
         if let Some(episode) = episode {
             find_trace(&folder, episode, helper.as_deref(), None)?;
         }
         let helper = helper.as_ref().map_or(String::new(), |helper| format!(" with {helper}"));
         bail!("{} has no traces{helper}", run.display());
     }
-    let pages: Vec<PageReplay<'_>> =
-        replays.iter().map(|(name, trace, episode)| PageReplay { name, trace, episode }).collect();
-    let page = replay_page(&format!("chaic: replays of {}", run.display()), &pages);
+    let paths: Vec<PathBuf> =
+        found.iter().take(*max as usize).map(|(path, _)| path.clone()).collect();
+    let (replays, warnings) = read_replays(&folder, &options, &paths)?;
+    warnings.iter().for_each(|warning| print_warning(&warning.to_string()));
+    let page = page(&format!("chaic: replays of {}", run.display()), None, &replays);
     let out = out.clone().unwrap_or_else(|| folder.path().join(FILE_NAME));
     write_atomically(&out, page.as_bytes())?;
     if let Some(n @ 1..) = found.len().checked_sub(replays.len()) {

@@ -9,8 +9,8 @@ use serde::Serialize;
 
 use crate::error::Result;
 use crate::metrics::{
-    Environments, FormulaSet, MAX_NAMED, PlayedEpisodes, RunResult, RunStatus, Score, Scores,
-    differences, run_differences,
+    Difference, Environments, FormulaSet, MAX_NAMED, PlayedEpisodes, Resolution, RunResult,
+    RunStatus, Score, Scores, differences, resolution, run_differences,
 };
 use crate::report::Format;
 use crate::report::coverage::coverage;
@@ -51,6 +51,17 @@ impl Report<'_> {
     /// Computes the scores.
     pub fn scores(&self) -> Scores {
         Scores::new(self.played_episodes(&self.plan()), &self.formulas.formulas())
+    }
+
+    /// Returns the paired differences of the transport rate between all helpers.
+    pub fn differences(&self) -> Vec<Difference> {
+        differences(self.played_episodes(&self.plan()), &self.scores().helpers())
+    }
+
+    /// Returns the smallest difference that all tasks together distinguish from zero; `None` if no
+    /// pair of helpers has an interval.
+    pub fn resolution(&self) -> Option<Resolution> {
+        resolution(&self.differences(), None)
     }
 
     /// Returns the labels of the rows.
@@ -140,7 +151,7 @@ impl Report<'_> {
 
     fn terminal(&self) -> String {
         let scores = self.scores();
-        let differences = differences(self.played_episodes(&self.plan()), &scores.helpers());
+        let differences = self.differences();
         let mut tables = self.tables(&scores);
         tables.extend(resolutions(&differences, &scores.tasks()));
         let mut text: String = tables.iter().map(|t| t.to_terminal() + "\n").collect();
@@ -178,7 +189,7 @@ impl Report<'_> {
         for note in self.notes() {
             let _ = writeln!(text, "**{note}**\n");
         }
-        let differences = differences(self.played_episodes(&self.plan()), &scores.helpers());
+        let differences = self.differences();
         let mut tables = self.tables(&scores);
         tables.push(intervals(&scores, self.labels()));
         if !differences.is_empty() {

@@ -137,6 +137,37 @@ impl RunOptions {
         Digest::of_bytes(&serde_json::to_vec(self).expect("options have string keys"))
     }
 
+    /// Returns the command that plays the same run. Helpers that are not built in appear by their name
+    /// only, and the folder of episode files as `DIR`.
+    pub fn command(&self) -> String {
+        let tasks: Vec<&str> = self.tasks.iter().map(|task| task.name()).collect();
+        let mut words = vec!["chaic eval".to_owned()];
+        let mut option = |name: &str, value: Option<String>| {
+            words.extend(value.map(|value| format!("--{name} {value}")));
+        };
+        let is_all = self.tasks.iter().copied().eq(TaskId::paper());
+        option("task", (!is_all).then(|| tasks.join(",")));
+        option("helper", (self.helpers != DEFAULT_HELPERS).then(|| self.helpers.join(",")));
+        match self.split.as_str() {
+            FILES => option("episodes", Some("DIR".to_owned())),
+            split => option("split", (split != Split::Test.to_string()).then(|| split.to_owned())),
+        }
+        option("n-episodes", self.first.map(|n| n.to_string()));
+        option("seeds", (self.seeds != 1).then(|| self.seeds.to_string()));
+        option("size", self.size.map(|px| px.to_string()));
+        option("rules", (self.rules != RuleSetName::Paper).then(|| self.rules.to_string()));
+        for setting in &self.set {
+            option("set", Some(setting.clone()));
+        }
+        option("partner", self.partner.clone());
+        option("person", self.partner_is.map(|kind| kind.to_string()));
+        option("appearance", self.appearance.clone());
+        option("perception", self.perception.clone());
+        option("behavior", self.behavior.clone());
+        option("track", (self.track != Track::default()).then(|| self.track.to_string()));
+        words.join(" ")
+    }
+
     /// Returns the appearance of scenes.
     ///
     /// # Errors

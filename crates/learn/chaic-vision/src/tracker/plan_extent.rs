@@ -52,6 +52,14 @@ impl PlanExtent {
         self.ranges.iter().map(|[low, high]| high - low).fold(0.0, f32::max)
     }
 
+    /// Returns whether a point lies inside, or at most `margin_m` outside.
+    pub fn contains(&self, point: Vec2, margin_m: f32) -> bool {
+        DIRECTIONS.iter().zip(self.ranges).all(|(direction, [low, high])| {
+            let at = direction.dot(point);
+            at >= low - margin_m && at <= high + margin_m
+        })
+    }
+
     /// Middle of the axis-parallel bounding box.
     pub fn center(&self) -> Vec2 {
         let middle = |k: usize| 0.5 * (self.ranges[k][0] + self.ranges[k][1]);
@@ -72,6 +80,11 @@ mod tests {
         let both = front.union(&side);
         assert!((2.15..2.24).contains(&both.diameter_m()), "{}", both.diameter_m());
         assert_eq!(both.center(), Vec2::new(1.0, -0.5));
+        let inside =
+            [(1.0, -0.4, true), (1.9, -0.9, false), (2.05, -0.02, true), (2.2, 0.0, false)];
+        for (x, z, expected) in inside {
+            assert_eq!(both.contains(Vec2::new(x, z), 0.1), expected, "{x} {z}");
+        }
         assert_eq!(PlanExtent::new(&[]), None);
         let mut points: Vec<Vec2> = (0..=40).map(|k| Vec2::new(0.05 * k as f32, 0.0)).collect();
         points.push(Vec2::new(9.0, 0.0));

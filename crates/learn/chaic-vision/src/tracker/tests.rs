@@ -236,3 +236,37 @@ fn people_are_associated_by_height_and_position() {
     let found = observer.observe(&[person(1.2, [-1.0, 0.6, -3.0])]);
     assert_eq!(x_of(&found, AgentId::PARTNER), Some(-1.0));
 }
+
+#[test]
+fn pixels_within_a_known_obstacle_are_not_static_until_it_is_removed() {
+    let mut observer = Observer::new(&[]);
+    let mut bin = measurement("trashbin", 0.9, [0.0, 0.4, -3.0]);
+    bin.extent.footprint = (-1..=1).map(|k| Vec2::new(0.125 * k as f32, -3.0)).collect();
+    let found = observer.observe(std::slice::from_ref(&bin));
+    let camera = Camera {
+        eye_in_world: 1.65 * Vec3::Y,
+        world_from_camera: yaw_rotation(0.0),
+        vertical_fov_rad: Camera::EYE_FOV_RAD,
+        width: SIDE_PX,
+        height: SIDE_PX,
+    };
+    // A plane through the obstacle.
+    let depth_m = vec![3.0; (SIDE_PX * SIDE_PX) as usize];
+    let masked = |observer: &Observer| {
+        let mut mask = vec![false; depth_m.len()];
+        observer.tracker.mask_movables(&depth_m, &camera, 1, &mut mask);
+        mask
+    };
+    let mask = masked(&observer);
+    let at = |x: f32, y: f32| {
+        let (px, _) = camera.project(Vec3::new(x, y, -3.0)).expect("in view");
+        mask[px.y as usize * SIDE_PX as usize + px.x as usize]
+    };
+    let points = [(0.0, 0.5), (0.2, 0.5), (0.4, 0.5), (0.0, 0.03), (0.0, 2.1)];
+    assert_eq!(points.map(|(x, y)| at(x, y)), [true, true, false, false, false]);
+    let obstacle = found[0].track;
+    let removal = Action::RemoveObstacle { obstacle, hand: Hand::Left };
+    observer.tracker.update_hands(&Hands::default(), Some((removal, Outcome::Success)));
+    observer.observe(&[]);
+    assert!(!masked(&observer).contains(&true));
+}

@@ -7,7 +7,7 @@ pub(super) const EXAMPLES: &[CommandExamples] = &[
         "chaic verify",
         [
             ("Verify a run", "chaic verify runs/quick"),
-            ("Use two threads", "chaic verify runs/quick --jobs 2"),
+            ("Verify the trace of a game in a browser", "chaic verify trace.jsonl"),
             ("Print the findings as JSON", "chaic verify runs/quick --format json"),
         ],
     ),

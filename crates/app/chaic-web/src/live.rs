@@ -1,0 +1,468 @@
+//! Episode that a person plays, as partner or helper.
+
+use chaic_agents::perception_factory::GroundTruthPerceptionFactory;
+use chaic_agents::policies::ExternalPolicy;
+use chaic_agents::{PlanningAgent, partners};
+use chaic_core::agent::Thought;
+use chaic_core::observation::{Grants, Held, SensorConfig};
+use chaic_core::{Action, Agent as _, AgentError, AgentId, Frame, Hand, Outcome, Target};
+use chaic_env::helper_registry::{Helper, NONE, built_in};
+use chaic_env::narration::{Caption, event_text, object_name};
+use chaic_env::rules::RuleSet;
+use chaic_env::trace::{BranchPoint, Header, Record, Trace};
+use chaic_env::{
+    AdvanceOutcome, AgentSlot, Digest, Env, EnvError, EpisodeAgents, EpisodeConfig, Playback,
+};
+use chaic_episodes::{Episode, EpisodeError};
+use chaic_render::{Channels, Scene, View, floor_plan};
+use chaic_world::{EventKind, Setup};
+use serde::{Deserialize, Serialize};
+
+use crate::drawing::DrawnImage;
+use crate::timeline::StoryLine;
+
+/// Name in traces of an agent that a person controls.
+pub const PERSON: &str = "human";
+
+/// Reason why an episode cannot be played.
+#[derive(Debug, thiserror::Error)]
+pub enum LiveError {
+    /// The episode is unreadable.
+    #[error(transparent)]
+    Episode(#[from] EpisodeError),
+    /// The environment refuses the episode, or a trace is unreadable.
+    #[error(transparent)]
+    Env(#[from] EnvError),
+    /// An agent cannot decide.
+    #[error(transparent)]
+    Agent(#[from] AgentError),
+    /// A page can only play helpers without weights and other processes.
+    #[error("the helper `{0}` cannot run in a page")]
+    NoHelper(String),
+    /// A person controls partner or helper.
+    #[error("agent {0} has no seat for a person")]
+    NoSeat(AgentId),
+    /// The agents act differently than in the trace, such as those of another version.
+    #[error("the other agents do not act as in the trace; take over from an earlier frame")]
+    Diverged,
+}
+
+/// Level of the person's decisions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum InputLevel {
+    /// The person chooses plans, which a planner executes.
+    Plans,
+    /// The person chooses each action.
+    Steps,
+}
+
+/// What is played, and by whom.
+#[derive(Clone, Debug, Deserialize)]
+pub struct LiveConfig {
+    /// Index of the seed.
+    pub seed: u32,
+    /// Agent that the person controls: partner or helper.
+    pub seat: AgentId,
+    /// Level of the person's decisions.
+    pub level: InputLevel,
+    /// Helper if the person is the partner, a built-in one or `none`.
+    pub helper: String,
+}
+
+/// Progress of the episode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LiveStatus {
+    /// The person acts or waits.
+    Running,
+    /// The person must decide; the world waits.
+    Waiting,
+    /// The episode is over.
+    Ended,
+}
+
+/// State of a played episode.
+#[derive(Clone, Debug, Serialize)]
+pub struct LiveState {
+    /// Frame.
+    pub frame: Frame,
+    /// Last frame of the episode if the goal is not reached before.
+    pub horizon: Frame,
+    /// Progress.
+    pub status: LiveStatus,
+    /// Plans that can be started now, if the person chooses plans and must decide.
+    pub plans: Vec<String>,
+    /// Contents of the left and the right hand in words; absent for an empty hand.
+    pub hands: [Option<String>; 2],
+    /// Why the person's last action failed, if it did.
+    pub failure: Option<String>,
+    /// Action and plan of the person's agent.
+    pub caption: Caption,
+    /// Achieved and total value of the goal; absent for a person who helps, until the end.
+    pub progress: Option<[f64; 2]>,
+    /// Events since the last state that the person notices.
+    pub events: Vec<StoryLine>,
+}
+
+/// Facts about a played episode that do not change.
+#[derive(Clone, Debug, Serialize)]
+pub struct LiveInfo {
+    /// Name of the task.
+    pub task: &'static str,
+    /// Episode id.
+    pub episode: String,
+    /// Wanted objects, for example `3 apple`; empty for a person who must find out.
+    pub goal: Vec<String>,
+    /// Kind of person of the partner.
+    pub person: String,
+    /// Lowest and highest reach of the person's body, meters.
+    pub reach_m: [f32; 2],
+    /// Maximum mass that the person's body lifts, kilograms.
+    pub strength_kg: f32,
+}
+
+/// Episode that a person plays.
+pub struct LiveSession {
+    env: Env,
+    setup: Setup,
+    scene: Scene,
+    seat: AgentId,
+    level: InputLevel,
+    /// Executes the person's plans; `None` if the person chooses actions.
+    planner: Option<Planner>,
+    status: LiveStatus,
+    branch_of: Option<BranchPoint>,
+    /// Records of the trace.
+    lines: Vec<String>,
+    events: Vec<StoryLine>,
+}
+
+/// Planner that executes the person's plans.
+struct Planner {
+    agent: PlanningAgent<ExternalPolicy>,
+    /// True if it has observed the current turn.
+    has_observed: bool,
+}
+
+impl LiveSession {
+    /// Starts an episode (JSON).
+    ///
+    /// # Errors
+    /// If the episode is unreadable, or a helper or seat does not exist.
+    pub fn start(episode: &[u8], config: &LiveConfig) -> Result<LiveSession, LiveError> {
+        let episode = Episode::parse(episode, "episode")?;
+        LiveSession::of_episode(&episode, config)
+    }
+
+    fn of_episode(episode: &Episode, config: &LiveConfig) -> Result<LiveSession, LiveError> {
+        let rules = RuleSet::PAPER;
+        let (grants, is_helper) = match config.seat {
+            AgentId::PARTNER => (partners::partner_grants(rules.planner), false),
+            AgentId::HELPER => (Grants::PLANNER, true),
+            seat => return Err(LiveError::NoSeat(seat)),
+        };
+        let sensors = match config.level {
+            InputLevel::Plans => SensorConfig::DEPTH_AND_IDS,
+            InputLevel::Steps => SensorConfig { rgb: true, ..SensorConfig::NONE },
+        };
+        let person = AgentSlot::external(grants, sensors);
+        let agents = if is_helper {
+            EpisodeAgents { helper: Some(person), partner: None }
+        } else {
+            let helper = helper(&config.helper, rules)?.map(AgentSlot::from);
+            EpisodeAgents { helper, partner: Some(person) }
+        };
+        let name = if is_helper { PERSON } else { config.helper.as_str() };
+        let partner = (!is_helper).then_some(PERSON);
+        let env_config =
+            EpisodeConfig { seed: config.seed, partner, ..EpisodeConfig::new(episode, name) };
+        let env = Env::new(env_config, agents)?;
+        let planner = (config.level == InputLevel::Plans).then(|| {
+            let mut agent = PlanningAgent::with_watched(
+                ExternalPolicy::default(),
+                rules.planner,
+                &GroundTruthPerceptionFactory,
+                AgentId::PARTNER,
+                grants,
+            );
+            agent.reset(&env.briefing(config.seat));
+            Planner { agent, has_observed: false }
+        });
+        Ok(LiveSession {
+            scene: Scene::new(env.world().setup()),
+            setup: env.world().setup().clone(),
+            lines: Vec::new(),
+            branch_of: None,
+            env,
+            seat: config.seat,
+            level: config.level,
+            planner,
+            status: LiveStatus::Running,
+            events: Vec::new(),
+        })
+    }
+
+    /// Starts with the decisions of a trace (JSON lines) before a frame; then the person goes on with
+    /// the agent of the seat. The helper of the trace takes part if the person is the partner.
+    ///
+    /// # Errors
+    /// If trace or episode are unreadable, or the other agents do not act as in the trace.
+    pub fn take_over(
+        bytes: &[u8],
+        episode: &[u8],
+        from: Frame,
+        config: &LiveConfig,
+    ) -> Result<LiveSession, LiveError> {
+        let (trace, _) = chaic_env::trace::parse(bytes, "trace".as_ref())?;
+        let episode = Episode::parse(episode, "episode")?;
+        let (helper, seed) = (trace.header.helper.clone(), trace.header.seed);
+        let config = LiveConfig { helper, seed, ..config.clone() };
+        let mut session = LiveSession::of_episode(&episode, &config)?;
+        let mut decisions = trace.decisions().filter(|d| d.agent == config.seat).peekable();
+        while session.env.world().state().frame < from && session.status != LiveStatus::Ended {
+            if session.run_frame()? != AdvanceOutcome::NeedsAction {
+                continue;
+            }
+            let frame = session.env.world().state().frame;
+            let next = decisions.next_if(|decision| decision.frame == frame);
+            let action = next.ok_or(LiveError::Diverged)?.action.map(Target::Entity);
+            session.observe();
+            session.submit(action);
+        }
+        if digest_at(&trace, &episode, from)? != session.env.digest() {
+            return Err(LiveError::Diverged);
+        }
+        session.branch_of = Some(BranchPoint { trace: Digest::of_bytes(bytes), frame: from });
+        Ok(session)
+    }
+
+    /// Returns the facts that do not change. A person who helps does not learn the goal.
+    pub fn info(&self) -> LiveInfo {
+        let (header, setup) = (self.env.header(), self.env.world().setup());
+        let targets = setup.goal.targets.iter();
+        let goal = targets.map(|(class, n)| format!("{n} {}", class.info().label));
+        let goal: Vec<String> = goal.filter(|_| self.seat == AgentId::PARTNER).collect();
+        let body = setup.people[self.seat.index()].capability();
+        LiveInfo {
+            task: header.task.info().title,
+            episode: header.episode.clone(),
+            goal,
+            person: setup.people[AgentId::PARTNER.index()].kind().to_string(),
+            reach_m: body.pick_range_m,
+            strength_kg: body.strength_kg,
+        }
+    }
+
+    /// Advances by at most this many frames, until the person must decide or the episode ends.
+    ///
+    /// # Errors
+    /// If an agent cannot decide.
+    pub fn advance(&mut self, n_frames: Frame) -> Result<LiveStatus, LiveError> {
+        let end = self.env.world().state().frame + n_frames;
+        while self.status != LiveStatus::Ended && self.env.world().state().frame < end {
+            if self.run_frame()? != AdvanceOutcome::NeedsAction {
+                continue;
+            }
+            match self.planned_action()? {
+                Some(action) => self.submit(action),
+                None => {
+                    self.status = LiveStatus::Waiting;
+                    break;
+                }
+            }
+        }
+        Ok(self.status)
+    }
+
+    /// Selects one of the plans of the last state. Returns false if it does not exist.
+    pub fn choose_plan(&mut self, index: usize) -> bool {
+        let planner = self.planner.as_mut().filter(|_| self.status == LiveStatus::Waiting);
+        let is_chosen = planner.is_some_and(|planner| planner.agent.policy_mut().set_plan(index));
+        if is_chosen {
+            self.status = LiveStatus::Running;
+        }
+        is_chosen
+    }
+
+    /// Performs an action. Returns false, without any change, if the person cannot decide now or
+    /// chooses plans.
+    pub fn act(&mut self, action: Action) -> bool {
+        let is_due = self.planner.is_none() && self.status == LiveStatus::Waiting;
+        if is_due {
+            self.submit(action);
+        }
+        is_due
+    }
+
+    fn submit(&mut self, action: Action) {
+        self.env.submit(self.seat, action);
+        self.status = LiveStatus::Running;
+        if let Some(planner) = &mut self.planner {
+            planner.has_observed = false;
+        }
+    }
+
+    fn run_frame(&mut self) -> Result<AdvanceOutcome, LiveError> {
+        let LiveSession { env, setup, lines, events, seat, .. } = self;
+        let mut sink = |record: &Record| -> Result<(), AgentError> {
+            if let Record::Event(event) = record
+                && notices(*seat, &event.event.kind)
+            {
+                let (frame, text) = (event.event.frame, event_text(setup, &event.event.kind));
+                events.extend(text.map(|text| StoryLine { frame, text }));
+            }
+            lines.push(record.to_line());
+            Ok(())
+        };
+        let outcome = env.run_frame(&mut sink)?;
+        if outcome == AdvanceOutcome::Ended {
+            self.status = LiveStatus::Ended;
+        }
+        Ok(outcome)
+    }
+
+    /// Shows the current turn to the planner.
+    fn observe(&mut self) {
+        if let Some(planner) = self.planner.as_mut().filter(|planner| !planner.has_observed)
+            && let Some(observation) = self.env.observe(self.seat)
+        {
+            planner.agent.observe(observation);
+            planner.has_observed = true;
+        }
+    }
+
+    /// Returns the next action of the person's plan; `None` if the person must decide.
+    fn planned_action(&mut self) -> Result<Option<Action>, LiveError> {
+        self.observe();
+        let Some(planner) = &mut self.planner else { return Ok(None) };
+        match planner.agent.next_action() {
+            Ok(action) => Ok(Some(action)),
+            Err(AgentError::Halted(_)) => Ok(None),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    /// Returns the current state, with the events since the last call.
+    pub fn state(&mut self) -> LiveState {
+        let events = std::mem::take(&mut self.events);
+        let world = self.env.world();
+        let person = &world.state().agents[self.seat.index()];
+        let failure = match &person.last {
+            Some((_, Outcome::Failure(reason))) if person.activity.is_none() => {
+                Some(reason.to_string())
+            }
+            _ => None,
+        };
+        let (done, total) = world.progress();
+        let knows_progress = self.seat == AgentId::PARTNER || self.status == LiveStatus::Ended;
+        LiveState {
+            frame: world.state().frame,
+            horizon: world.setup().horizon,
+            status: self.status,
+            plans: self.plans(),
+            hands: self.hands(),
+            failure,
+            caption: self.caption(),
+            progress: knows_progress.then_some([done, total]),
+            events,
+        }
+    }
+
+    fn plans(&self) -> Vec<String> {
+        let planner = self.planner.as_ref().filter(|_| self.status == LiveStatus::Waiting);
+        let valid = planner.map_or(&[][..], |planner| planner.agent.policy().valid());
+        valid.iter().map(ToString::to_string).collect()
+    }
+
+    fn hands(&self) -> [Option<String>; 2] {
+        let proprioception = self.env.world().proprioception(self.seat, Grants::IDS, None);
+        let text = |held: &Held| {
+            let identity = held.identity.as_ref();
+            let name = identity.map(|held| object_name(&self.setup, held.entity));
+            let name = name.unwrap_or_else(|| "something".to_owned());
+            match held.n_contents {
+                0 => name,
+                n => format!("{name} with {n} inside"),
+            }
+        };
+        Hand::BOTH.map(|hand| proprioception.hands[hand.index()].as_ref().map(text))
+    }
+
+    fn caption(&self) -> Caption {
+        let plan = self.planner.as_ref().and_then(|planner| planner.agent.plan());
+        let plan = plan.map_or_else(String::new, |plan| plan.to_string());
+        let thought = Thought { plan, ..Thought::default() };
+        Caption::of_agent(self.env.world(), self.seat, PERSON, &thought)
+    }
+
+    /// Returns the trace so far (JSON lines).
+    pub fn trace(&self) -> String {
+        let mut header = Header { branch_of: self.branch_of, ..self.env.header().clone() };
+        let input = match self.level {
+            InputLevel::Plans => "plans",
+            InputLevel::Steps => "steps",
+        };
+        header.people[self.seat.index()].input = Some(input.to_owned());
+        let lines = std::iter::once(header.to_line()).chain(self.lines.iter().cloned());
+        lines.map(|line| line + "\n").collect()
+    }
+
+    /// Draws what the person sees, as a square image.
+    pub fn draw_view(&self, side_px: u32) -> DrawnImage {
+        let view = View::from_agent(self.env.world(), self.seat, side_px, Channels::RGB);
+        let images = self.scene.render(self.env.world(), &[view]);
+        let rgb = images.into_iter().next().and_then(|images| images.rgb).unwrap_or_default();
+        DrawnImage::from_rgb(side_px, side_px, &rgb)
+    }
+
+    /// Draws the map of the whole place, for viewers after the end of the episode.
+    pub fn draw_map(&self, width_px: u32) -> DrawnImage {
+        let map = floor_plan::draw_scene_plan(&self.scene, self.env.world(), width_px);
+        DrawnImage::from_rgb(map.width(), map.height(), map.as_raw())
+    }
+}
+
+/// Returns whether a person in this seat learns of an event: of what its agent does, and of deliveries
+/// if it is the partner.
+fn notices(seat: AgentId, event: &EventKind) -> bool {
+    match *event {
+        EventKind::Delivered { by, .. } => by == seat || seat == AgentId::PARTNER,
+        EventKind::Broke { agent, .. } | EventKind::Ended { agent, .. } => agent == seat,
+        EventKind::LiftedTogether { .. } | EventKind::Over { .. } => true,
+        _ => false,
+    }
+}
+
+/// Plays an episode (JSON) with the rule-based partner and a built-in helper, and returns the
+/// delivered fraction of the goal, to which a person compares theirs.
+///
+/// # Errors
+/// If the episode is unreadable, or the helper does not exist.
+pub fn reference(episode: &[u8], helper_name: &str, seed: u32) -> Result<f64, LiveError> {
+    let episode = Episode::parse(episode, "episode")?;
+    let config = EpisodeConfig { seed, ..EpisodeConfig::new(&episode, helper_name) };
+    let mut env = Env::new(config, helper(helper_name, config.rules)?)?;
+    env.advance(None)?;
+    let (done, total) = env.world().progress();
+    Ok(if total > 0.0 { done / total } else { 0.0 })
+}
+
+/// Creates a built-in helper; `None` for `none`.
+fn helper(name: &str, rules: RuleSet) -> Result<Option<Helper>, LiveError> {
+    if name == NONE {
+        return Ok(None);
+    }
+    let found = built_in(name, rules.planner, &GroundTruthPerceptionFactory);
+    found.map(Some).ok_or_else(|| LiveError::NoHelper(name.to_owned()))
+}
+
+/// Returns the digest of a trace's state at a frame.
+fn digest_at(trace: &Trace, episode: &Episode, frame: Frame) -> Result<Digest, LiveError> {
+    let mut playback = Playback::new(trace, episode)?;
+    while playback.world().state().frame < frame && playback.step()?.is_some() {}
+    Ok(Digest(playback.world().digest()))
+}
+
+#[cfg(test)]
+mod tests;

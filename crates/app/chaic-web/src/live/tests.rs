@@ -1,0 +1,125 @@
+//! Promises: a person's episode verifies; a plan or an action has effect; a branch continues the trace
+//! that it was taken from.
+
+use chaic_episodes::find_episode;
+
+use super::*;
+use crate::player::ReplayPlayer;
+
+fn episode() -> Vec<u8> {
+    let mut setup = find_episode("low_target/test/00").unwrap().into_setup();
+    setup.horizon = 900;
+    Episode::new("low_target/test/00", "short", None, setup).unwrap().to_json().into_bytes()
+}
+
+fn config(seat: AgentId, level: InputLevel, helper: &str) -> LiveConfig {
+    LiveConfig { seed: 0, seat, level, helper: helper.to_owned() }
+}
+
+/// Plays to the end; each decision selects the first plan.
+fn play(session: &mut LiveSession) {
+    for _ in 0..10_000 {
+        match session.advance(7).unwrap() {
+            LiveStatus::Running => {}
+            LiveStatus::Waiting => assert!(session.choose_plan(0)),
+            LiveStatus::Ended => return,
+        }
+    }
+    panic!("the episode does not end");
+}
+
+#[test]
+fn an_episode_of_plans_verifies_in_each_seat() {
+    let episode = episode();
+    for (seat, helper) in
+        [(AgentId::HELPER, "none"), (AgentId::PARTNER, "rhp"), (AgentId::PARTNER, "none")]
+    {
+        let config = config(seat, InputLevel::Plans, helper);
+        let mut session = LiveSession::start(&episode, &config).unwrap();
+        let info = session.info();
+        assert_eq!(
+            info.goal.is_empty(),
+            seat == AgentId::HELPER,
+            "only the partner knows the goal"
+        );
+        play(&mut session);
+        let player = ReplayPlayer::open(session.trace().as_bytes(), &episode).unwrap();
+        let replay = player.info();
+        assert_eq!((replay.n_verified, &replay.problem), (replay.n_decisions, &None));
+        assert!(replay.decisions.iter().filter(|line| line.agent == seat).count() > 20);
+        let names = [replay.helper.as_str(), PERSON];
+        assert_eq!(names[0] == names[1], seat == AgentId::HELPER);
+    }
+}
+
+#[test]
+fn a_person_who_decides_nothing_stops_the_world() {
+    let config = config(AgentId::HELPER, InputLevel::Plans, "none");
+    let mut session = LiveSession::start(&episode(), &config).unwrap();
+    assert_eq!(session.advance(500).unwrap(), LiveStatus::Waiting);
+    let state = session.state();
+    assert_eq!((state.frame, state.plans.is_empty()), (0, false));
+    assert_eq!(session.advance(500).unwrap(), LiveStatus::Waiting);
+    assert_eq!(session.state().frame, 0);
+    assert!(!session.choose_plan(999) && session.choose_plan(0) && !session.choose_plan(0));
+    session.advance(40).unwrap();
+    assert!(session.state().frame > 0);
+}
+
+#[test]
+fn steps_move_the_person_and_name_objects_by_pixel() {
+    let config = config(AgentId::PARTNER, InputLevel::Steps, "none");
+    let mut session = LiveSession::start(&episode(), &config).unwrap();
+    let pose = |session: &LiveSession| session.env.world().state().agents[0].pose;
+    let before = pose(&session);
+    for action in [Action::TurnLeft, Action::MoveForward, Action::Wait { frames: 3 }] {
+        assert!(!session.act(action), "nothing is asked yet");
+        while session.advance(5).unwrap() == LiveStatus::Running {}
+        assert!(session.act(action));
+    }
+    while session.advance(5).unwrap() == LiveStatus::Running {}
+    let after = pose(&session);
+    assert!(before.position != after.position && before.yaw_rad != after.yaw_rad);
+    let object = Target::Pixel { column: 256, row: 300 };
+    assert!(session.act(Action::PickUp { object, hand: Hand::Left }));
+    while session.advance(5).unwrap() == LiveStatus::Running {}
+    assert!(session.trace().contains("\"pick_up\""));
+}
+
+#[test]
+fn a_branch_continues_a_trace() {
+    let episode = episode();
+    let whole = config(AgentId::PARTNER, InputLevel::Plans, "rhp");
+    let mut session = LiveSession::start(&episode, &whole).unwrap();
+    play(&mut session);
+    let parent = session.trace();
+    for (seat, frame) in [(AgentId::PARTNER, 300), (AgentId::PARTNER, 0)] {
+        let config = config(seat, InputLevel::Plans, "none");
+        let mut branch =
+            LiveSession::take_over(parent.as_bytes(), &episode, frame, &config).unwrap();
+        assert_eq!(branch.state().frame, frame);
+        let common = |trace: &str| -> Vec<String> {
+            let before = |line: &&str| {
+                let start = line.trim_start_matches('[').split(',').next().unwrap_or_default();
+                line.starts_with('[') && start.parse::<u32>().is_ok_and(|at| at < frame)
+            };
+            trace.lines().filter(before).map(str::to_owned).collect()
+        };
+        assert_eq!(common(&branch.trace()), common(&parent));
+        play(&mut branch);
+        assert!(branch.trace().contains(&format!("\"frame\":{frame}}}")), "it names the frame");
+        let player = ReplayPlayer::open(branch.trace().as_bytes(), &episode).unwrap();
+        assert_eq!(player.info().problem, None);
+    }
+}
+
+#[test]
+fn helpers_with_weights_and_other_seats_are_refused() {
+    let start = |seat, helper| {
+        LiveSession::start(&episode(), &config(seat, InputLevel::Plans, helper)).err()
+    };
+    assert!(matches!(start(AgentId::PARTNER, "rl"), Some(LiveError::NoHelper(_))));
+    assert!(matches!(start(AgentId::CHILD, "none"), Some(LiveError::NoSeat(_))));
+    assert!(matches!(reference(&episode(), "rl", 0), Err(LiveError::NoHelper(_))));
+    assert!(reference(&episode(), "none", 0).unwrap() > 0.0);
+}

@@ -1,0 +1,45 @@
+//! Replays of a page, read from the folder of a run.
+
+use std::path::PathBuf;
+
+use chaic_env::RunKey;
+use chaic_env::trace::TraceWarning;
+use chaic_eval::Result;
+use chaic_eval::run::{RunFolder, RunOptions};
+
+/// Replay in a page.
+#[derive(Clone, Debug)]
+pub struct PageReplay {
+    /// Episode run.
+    pub key: RunKey,
+    /// Name in the list of replays.
+    pub name: String,
+    /// Trace file (JSON lines).
+    pub trace: String,
+    /// Episode file (JSON).
+    pub episode: String,
+}
+
+/// Reads the replays of these traces. A damaged trace is read up to its last complete record; warnings
+/// describe what is left out.
+///
+/// # Errors
+/// If a trace or its episode cannot be read.
+pub fn read_replays(
+    folder: &RunFolder,
+    options: &RunOptions,
+    traces: &[PathBuf],
+) -> Result<(Vec<PageReplay>, Vec<TraceWarning>)> {
+    let mut all_warnings = Vec::new();
+    let mut read = |path: &PathBuf| {
+        let (trace, warnings) = folder.read_trace(path)?;
+        all_warnings.extend(warnings);
+        let key = trace.header.key();
+        let name = format!("{}, {}, seed {}", key.episode, key.helper, key.seed);
+        let lines: Vec<String> = trace.lines().collect();
+        let episode = folder.episode(options, &key)?.to_json_line();
+        Ok(PageReplay { key, name, trace: lines.join("\n") + "\n", episode })
+    };
+    let replays: Result<Vec<PageReplay>> = traces.iter().map(&mut read).collect();
+    Ok((replays?, all_warnings))
+}

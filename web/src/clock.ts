@@ -1,0 +1,111 @@
+// Position in a replay: playing, pausing and stepping. Elements that show replays own one.
+
+import type { ReactiveController, ReactiveControllerHost } from "lit";
+import { nearest } from "./frames.js";
+
+export const SPEEDS = [0.5, 1, 2, 4, 8];
+
+/** Frames that a clock moves through. */
+export interface Frames {
+  last: number;
+  perSecond: number;
+  /** Frames of events, in ascending order. */
+  events: number[];
+}
+
+/** Position in a replay. */
+export class PlaybackClock implements ReactiveController {
+  frame = 0;
+  isPlaying = false;
+  speed = 1;
+  private frames?: Frames;
+  private lastTime = 0;
+  private position = 0;
+
+  /** `draw` shows a frame; `isBusy` tells whether the last one is still drawn, so that playing skips frames. */
+  constructor(
+    private readonly host: ReactiveControllerHost,
+    private readonly draw: (frame: number) => void,
+    private readonly isBusy: () => boolean,
+  ) {
+    host.addController(this);
+  }
+
+  hostDisconnected(): void {
+    this.isPlaying = false;
+  }
+
+  /** Starts with other frames; undefined while there are none. */
+  reset(frames?: Frames): void {
+    this.frames = frames;
+    this.isPlaying = false;
+    this.host.requestUpdate();
+  }
+
+  /** Shows a frame and stops. */
+  seek(frame: number): void {
+    this.isPlaying = false;
+    this.show(frame);
+  }
+
+  /** Plays or pauses. At the end, it starts again. */
+  toggle(): void {
+    if (!this.frames) return;
+    if (this.frame >= this.frames.last) this.show(0);
+    this.isPlaying = !this.isPlaying;
+    this.lastTime = performance.now();
+    if (this.isPlaying) requestAnimationFrame((time) => this.advance(time));
+    this.host.requestUpdate();
+  }
+
+  /** Moves to the next or previous event. */
+  jump(direction: 1 | -1): void {
+    const found = nearest(this.frames?.events ?? [], this.frame, direction);
+    if (found !== undefined) this.seek(found);
+  }
+
+  /** Handles the keys of a replay. */
+  press(event: KeyboardEvent): void {
+    const target = event.composedPath()[0] as HTMLElement;
+    if (event.ctrlKey || event.altKey || event.metaKey || target.matches("select, input")) return;
+    const step = event.shiftKey ? (this.frames?.perSecond ?? 30) : 1;
+    const actions: Record<string, () => void> = {
+      " ": () => this.toggle(),
+      ArrowLeft: () => this.seek(this.frame - step),
+      ArrowRight: () => this.seek(this.frame + step),
+      "[": () => this.jump(-1),
+      "]": () => this.jump(1),
+      Home: () => this.seek(0),
+      End: () => this.seek(this.frames?.last ?? 0),
+    };
+    const action = actions[event.key];
+    // A focused button handles the space bar itself.
+    if (!action || (event.key === " " && target.matches("button"))) return;
+    event.preventDefault();
+    action();
+  }
+
+  private show(frame: number): void {
+    if (!this.frames) return;
+    this.frame = Math.max(0, Math.min(Math.round(frame), this.frames.last));
+    this.position = this.frame;
+    this.draw(this.frame);
+    this.host.requestUpdate();
+  }
+
+  private advance(time: number): void {
+    if (!this.isPlaying || !this.frames) return;
+    // A tab in the background gets no callbacks; the replay goes on where it was.
+    const elapsed = Math.min(time - this.lastTime, 250) / 1000;
+    this.lastTime = time;
+    this.position += elapsed * this.speed * this.frames.perSecond;
+    const frame = Math.min(Math.floor(this.position), this.frames.last);
+    if (frame !== this.frame && !this.isBusy()) {
+      this.frame = frame;
+      this.draw(frame);
+    }
+    if (this.frame >= this.frames.last) this.isPlaying = false;
+    else requestAnimationFrame((next) => this.advance(next));
+    this.host.requestUpdate();
+  }
+}

@@ -1,0 +1,37 @@
+// Playing in a page: starts a game, and offers its trace and replay at the end.
+
+import type { Branch, LiveConfig } from "./messages.js";
+import "./play.js";
+import type { ChaicPlay, GameResult } from "./play.js";
+
+/** How fast the world moves, and whether it waits for the person. */
+export interface Pace {
+  isLive: boolean;
+  speed: number;
+}
+
+/** Plays an episode in an element of the page; `onReplay` receives the trace if the person wants to watch it. */
+export async function startGame(
+  place: Element,
+  game: { module: ArrayBuffer; workerSource: string; episode: Uint8Array; config: LiveConfig; pace: Pace; branch?: Branch },
+  onReplay: (result: GameResult) => void,
+): Promise<void> {
+  const { workerSource, pace, ...rest } = game;
+  const element = document.createElement("chaic-play") as ChaicPlay;
+  Object.assign(element, { workerSource, game: { ...rest, ...pace } });
+  element.addEventListener("finished", (event) => {
+    const { detail: result } = event as CustomEvent<GameResult>;
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(new Blob([result.trace], { type: "application/jsonl" }));
+    link.download = "trace.jsonl";
+    link.textContent = "Download the trace";
+    const watch = document.createElement("button");
+    watch.type = "button";
+    watch.textContent = "Watch the replay";
+    watch.addEventListener("click", () => onReplay(result));
+    const line = document.createElement("p");
+    line.append(link, " (chaic verify trace.jsonl checks it) ", watch);
+    place.append(line);
+  });
+  place.replaceChildren(element);
+}

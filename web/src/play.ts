@@ -1,0 +1,375 @@
+// Element <chaic-play>: an episode in which a person controls partner or helper.
+
+import { html, LitElement, nothing, type PropertyValues, type TemplateResult } from "lit";
+import { property, query, state } from "lit/decorators.js";
+import { clock } from "./frames.js";
+import type { Action, Branch, LiveConfig, LiveInfo, LiveState, Request, Response, StoryLine } from "./messages.js";
+import { drawnSize, MAX_PX, paint } from "./pictures.js";
+import { styles } from "./styles.js";
+
+const FRAMES_PER_SECOND = 30;
+/** Side of the images in which a person points at objects, pixels. */
+const POINTING_PX = 512;
+/** Helpers whose results are laid beside the person's. */
+const REFERENCES = ["none", "rhp", "oracle"];
+/** Duration of a pause in live play, frames. */
+const PAUSE_FRAMES = 3;
+/** Time for which each button is offered to users of a single switch, milliseconds. */
+const SCAN_MS = 1500;
+
+/** What is played. */
+export interface Game {
+  module: ArrayBuffer;
+  episode: Uint8Array;
+  config: LiveConfig;
+  /** True if the world goes on while the person thinks; otherwise it waits. */
+  isLive: boolean;
+  /** Simulated seconds per second. */
+  speed: number;
+  /** Recorded beginning. */
+  branch?: Branch;
+}
+
+/** Result of a finished episode, for the page around it. */
+export interface GameResult {
+  trace: string;
+  episode: Uint8Array;
+}
+
+type Hand = "left" | "right";
+
+/** Episode that a person plays. Set `game` and `workerSource`. */
+export class ChaicPlay extends LitElement {
+  static override styles = styles;
+
+  @property({ attribute: false }) game?: Game;
+  /** Program of the worker. */
+  @property({ attribute: false }) workerSource = "";
+
+  @state() private info?: LiveInfo;
+  @state() private shown?: LiveState;
+  @state() private story: StoryLine[] = [];
+  @state() private problem?: string;
+  @state() private references = new Map<string, number>();
+  @state() private scanned?: number;
+  /** What a click on the picture does. */
+  @state() private pointing: { kind: "pick_up" | "put_on" | "remove_obstacle"; hand: Hand } = {
+    kind: "pick_up",
+    hand: "left",
+  };
+
+  @query("canvas") private canvas?: HTMLCanvasElement;
+
+  private worker?: Worker;
+  private isBusy = false;
+  /** True after the end of the episode, or after the person has stopped. */
+  @state() private isOver = false;
+  private input?: { plan: number } | { action: Action };
+  private lastTime = 0;
+  private elapsedFrames = 0;
+  private scanTimer = 0;
+
+  override disconnectedCallback(): void {
+    super.disconnectedCallback();
+    this.close();
+  }
+
+  override updated(changed: PropertyValues<this>): void {
+    if (changed.has("game") && this.game) this.open(this.game);
+  }
+
+  private close(): void {
+    this.worker?.terminate();
+    this.worker = undefined;
+    clearInterval(this.scanTimer);
+    this.info = this.shown = this.problem = this.scanned = undefined;
+    this.story = [];
+    this.references = new Map();
+    this.isOver = false;
+  }
+
+  private open(game: Game): void {
+    this.close();
+    const url = URL.createObjectURL(new Blob([this.workerSource], { type: "text/javascript" }));
+    this.worker = new Worker(url);
+    URL.revokeObjectURL(url);
+    this.worker.onmessage = (event: MessageEvent<Response>) => this.receive(event.data);
+    this.worker.onerror = (event) => (this.problem = event.message || "the worker has stopped");
+    const { module, episode, config, branch } = game;
+    this.post({ type: "play", module, episode, config, branch });
+  }
+
+  private post(request: Request): void {
+    this.isBusy = true;
+    this.worker?.postMessage(request);
+  }
+
+  private receive(response: Response): void {
+    this.isBusy = false;
+    switch (response.type) {
+      case "playing":
+        this.info = response.info;
+        void this.updateComplete.then(() => this.begin());
+        break;
+      case "live":
+        this.show(response.state);
+        paint(this.canvas, response.view);
+        break;
+      case "trace":
+        this.finish(response.trace);
+        break;
+      case "reference":
+        this.references = new Map(this.references).set(response.helper, response.rate);
+        this.compareNext();
+        break;
+      case "error":
+        this.problem = response.message;
+        break;
+    }
+  }
+
+  private begin(): void {
+    this.lastTime = performance.now();
+    this.elapsedFrames = 1;
+    requestAnimationFrame((time) => this.advance(time));
+  }
+
+  private advance(time: number): void {
+    if (!this.worker || this.problem || this.isOver) return;
+    // A tab in the background gets no callbacks; the episode goes on where it was.
+    const speed = this.game?.speed ?? 1;
+    this.elapsedFrames += (Math.min(time - this.lastTime, 250) / 1000) * FRAMES_PER_SECOND * speed;
+    this.lastTime = time;
+    const isWaiting = this.shown?.status === "waiting" && !this.input;
+    if (isWaiting && this.game?.isLive && this.elapsedFrames >= 1) this.pause();
+    const frames = Math.floor(this.elapsedFrames);
+    if (!this.isBusy && frames > 0 && (!isWaiting || this.input)) {
+      this.elapsedFrames -= frames;
+      const viewPx = drawnSize(this.canvas, MAX_PX.view);
+      this.post({ type: "advance", frames, viewPx, input: this.input });
+      this.input = undefined;
+    } else if (isWaiting) {
+      this.elapsedFrames = Math.min(this.elapsedFrames, 1);
+    }
+    requestAnimationFrame((next) => this.advance(next));
+  }
+
+  /** Waits for a moment in live play. */
+  private pause(): void {
+    if (this.game?.config.level === "steps") this.input = { action: { wait: { frames: PAUSE_FRAMES } } };
+  }
+
+  private show(shown: LiveState): void {
+    const wasWaiting = this.shown?.status === "waiting";
+    this.shown = shown;
+    if (shown.events.length > 0) this.story = [...this.story, ...shown.events];
+    if (shown.status === "ended") this.stop();
+    if (shown.status !== "waiting") this.scanned = this.scanned === undefined ? undefined : 0;
+    else if (!wasWaiting) void this.updateComplete.then(() => this.focusChoices());
+  }
+
+  /** Moves the focus to the first plan, unless the person is elsewhere on the page. */
+  private focusChoices(): void {
+    const active = this.shadowRoot?.activeElement ?? (document.activeElement === document.body ? null : undefined);
+    if (active === undefined && !this.contains(document.activeElement)) return;
+    this.shadowRoot?.querySelector<HTMLButtonElement>(".plans button")?.focus();
+  }
+
+  /** Ends the game; its trace so far is complete. */
+  private stop(): void {
+    this.isOver = true;
+    this.post({ type: "trace" });
+  }
+
+  private finish(trace: string): void {
+    const { episode } = this.game!;
+    this.dispatchEvent(new CustomEvent<GameResult>("finished", { detail: { trace, episode } }));
+    if (this.shown?.status === "ended") this.compareNext();
+  }
+
+  /** Plays the next reference helper on the same episode and seed. */
+  private compareNext(): void {
+    const helper = REFERENCES.find((name) => !this.references.has(name));
+    if (helper) this.post({ type: "reference", helper });
+  }
+
+  private choose(plan: number): void {
+    if (this.shown?.status === "waiting" && !this.isOver) this.input = { plan };
+  }
+
+  private act(action: Action): void {
+    if (this.shown?.status === "waiting") this.input = { action };
+  }
+
+  private point(event: PointerEvent): void {
+    if (this.game?.config.level !== "steps") return;
+    const box = (event.currentTarget as HTMLElement).getBoundingClientRect();
+    const at = (offset: number, size: number): number =>
+      Math.max(0, Math.min(POINTING_PX - 1, Math.floor((offset / size) * POINTING_PX)));
+    const pixel = { column: at(event.clientX - box.left, box.width), row: at(event.clientY - box.top, box.height) };
+    const { kind, hand } = this.pointing;
+    const subject = { pick_up: "object", put_on: "place", remove_obstacle: "obstacle" }[kind];
+    this.act({ [kind]: { [subject]: { pixel }, hand } });
+  }
+
+  private press(event: KeyboardEvent): void {
+    const target = event.composedPath()[0] as HTMLElement;
+    if (event.ctrlKey || event.altKey || event.metaKey || target.matches("select, input")) return;
+    const isSteps = this.game?.config.level === "steps";
+    const digit = /^[1-9]$/.test(event.key) ? Number(event.key) - 1 : undefined;
+    const steps: Record<string, Action> = {
+      ArrowUp: "move_forward",
+      ArrowLeft: "turn_left",
+      ArrowRight: "turn_right",
+      ".": { wait: { frames: 10 } },
+    };
+    const action = isSteps ? steps[event.key] : undefined;
+    if (action) this.act(action);
+    else if (!isSteps && digit !== undefined) this.choose(digit);
+    else return;
+    event.preventDefault();
+  }
+
+  /** Offers one button after the other to users of a single switch: any key presses the offered one. */
+  private scan(isOn: boolean): void {
+    clearInterval(this.scanTimer);
+    this.scanned = isOn ? 0 : undefined;
+    if (!isOn) return;
+    this.scanTimer = window.setInterval(() => {
+      const buttons = [...this.shadowRoot!.querySelectorAll<HTMLButtonElement>(".plans button")];
+      if (buttons.length === 0) return;
+      this.scanned = ((this.scanned ?? -1) + 1) % buttons.length;
+      buttons[this.scanned]?.focus();
+    }, SCAN_MS);
+  }
+
+  override render(): TemplateResult {
+    const { info, shown } = this;
+    if (this.problem) return html`<p class="problem" role="alert">Cannot play: ${this.problem}</p>`;
+    if (!info) return html`<p role="status">Loading ...</p>`;
+    return html`<section aria-label="Play" @keydown=${(event: KeyboardEvent) => this.press(event)}>
+      ${this.heading(info)}
+      <div class="columns">
+        <figure class="a${this.game?.config.seat ?? 0}">
+          <canvas
+            class="view"
+            width="512"
+            height="512"
+            role="img"
+            aria-label="What you see"
+            @pointerdown=${(event: PointerEvent) => this.point(event)}
+          ></canvas>
+        </figure>
+        <div>
+          ${shown ? this.status(shown) : nothing}
+          ${this.game?.config.level === "plans" ? this.plans(shown) : this.steps(shown)}
+          ${this.isOver ? nothing : html`<p><button type="button" class="link" @click=${() => this.stop()}>Stop here</button></p>`}
+          ${shown?.status === "ended" ? this.result(shown) : nothing} ${this.events()}
+        </div>
+      </div>
+    </section>`;
+  }
+
+  private heading(info: LiveInfo): TemplateResult {
+    const isHelper = this.game?.config.seat === 1;
+    const [low, high] = info.reach_m.map((m) => m.toFixed(2));
+    const goal = isHelper
+      ? `The partner (${info.person}) wants something that you do not know. Find out and help.`
+      : `You are a ${info.person} and want ${info.goal.join(", ")}.`;
+    return html`<header>
+      <h2>${info.task}: you are the ${isHelper ? "helper" : "partner"}</h2>
+      <p>${goal} You reach from ${low} to ${high} m and lift ${info.strength_kg.toFixed(0)} kg.</p>
+      <p class="small">${info.episode}. A simulation: real people differ from these bodies and views.</p>
+    </header>`;
+  }
+
+  private status(shown: LiveState): TemplateResult {
+    const { action, plan } = shown.caption;
+    const hands = shown.hands.map((held) => held ?? "nothing");
+    const delivered = shown.progress ? `, ${shown.progress[0]} of ${shown.progress[1]} delivered` : "";
+    return html`<p class="time">
+        ${clock(shown.frame, FRAMES_PER_SECOND)} of ${clock(shown.horizon, FRAMES_PER_SECOND)}${delivered}
+      </p>
+      <p>Left hand: ${hands[0]}; right hand: ${hands[1]}</p>
+      <p role="status">You: ${action}${plan ? ` (${plan})` : ""}${shown.failure ? `; failed: ${shown.failure}` : ""}</p>`;
+  }
+
+  private plans(shown: LiveState | undefined): TemplateResult {
+    const isScanning = this.scanned !== undefined;
+    return html`<h3>What next?</h3>
+      <ol class="plans">
+        ${(shown?.plans ?? []).map(
+          (plan, k) =>
+            html`<li><button type="button" @click=${() => this.choose(k)}>${plan}</button></li>`,
+        )}
+      </ol>
+      ${shown?.status === "running" ? html`<p>Doing it ...</p>` : nothing}
+      <label>
+        <input
+          type="checkbox"
+          .checked=${isScanning}
+          @change=${(event: Event) => this.scan((event.target as HTMLInputElement).checked)}
+        />
+        Offer one plan after the other, for a single switch
+      </label>`;
+  }
+
+  private steps(shown: LiveState | undefined): TemplateResult {
+    const button = (label: string, action: Action): TemplateResult =>
+      html`<button type="button" @click=${() => this.act(action)}>${label}</button>`;
+    const change = (event: Event): void => {
+      const [kind, hand] = (event.target as HTMLSelectElement).value.split(" ");
+      this.pointing = { kind: kind as "pick_up", hand: hand as Hand };
+    };
+    const choices = [
+      ["pick_up left", "picks up with the left hand"],
+      ["pick_up right", "picks up with the right hand"],
+      ["put_on left", "puts what the left hand holds there"],
+      ["put_on right", "puts what the right hand holds there"],
+      ["remove_obstacle left", "removes an obstacle"],
+    ];
+    return html`<div class="controls" role="group" aria-label="Actions">
+        ${button("Turn left (left arrow)", "turn_left")} ${button("Walk (up arrow)", "move_forward")}
+        ${button("Turn right (right arrow)", "turn_right")} ${button("Put into the container", "put_in")}
+        ${button("Wait (.)", { wait: { frames: 10 } })}
+      </div>
+      <label>
+        A click on the picture
+        <select @change=${change}>
+          ${choices.map(([value, text]) => html`<option value=${value!}>${text}</option>`)}
+        </select>
+      </label>
+      ${shown?.status === "running" ? html`<p>Acting ...</p>` : nothing}`;
+  }
+
+  private result(shown: LiveState): TemplateResult {
+    const [done, total] = shown.progress ?? [0, 0];
+    const own = total > 0 ? done / total : 0;
+    const percent = (rate: number | undefined): string => (rate === undefined ? "..." : `${(100 * rate).toFixed(0)} %`);
+    const seat = this.game?.config.seat === 1 ? "your help" : "you as the partner";
+    return html`<h3>Result</h3>
+      <table>
+        <caption>Delivered part of the goal, same episode and seed</caption>
+        <tr><th scope="row">${seat}</th><td class="number">${percent(own)}</td></tr>
+        ${REFERENCES.map(
+          (name) => html`<tr>
+            <th scope="row">simulated partner, ${name === "none" ? "no helper" : `helper ${name}`}</th>
+            <td class="number">${percent(this.references.get(name))}</td>
+          </tr>`,
+        )}
+      </table>`;
+  }
+
+  private events(): TemplateResult {
+    return html`<div class="story">
+      <h3>Events</h3>
+      <ol reversed>
+        ${[...this.story].reverse().map(
+          (line) => html`<li><span class="time">${clock(line.frame, FRAMES_PER_SECOND)}</span> ${line.text}</li>`,
+        )}
+      </ol>
+    </div>`;
+  }
+}
+
+customElements.define("chaic-play", ChaicPlay);

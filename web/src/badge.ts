@@ -5,7 +5,7 @@ import type { ReplayInfo } from "./messages.js";
 
 /** Tells how many decisions of a replay agree with its re-simulation. */
 export function badge(info: ReplayInfo): TemplateResult {
-  const verified = info.n_verified === info.n_decisions && !info.problem;
+  const verified = info.n_verified === info.n_decisions;
   return html`<span class="badge ${verified ? "good" : "bad"}">
     ${verified ? "verified" : "not verified"}: ${info.n_verified} of ${info.n_decisions} decisions
   </span>`;

@@ -128,6 +128,8 @@ export class ChaicCompare extends LitElement {
   }
 
   private redraw(): void {
+    // The agents are known once both replays are open.
+    if (!this.infos[0] || !this.infos[1]) return;
     this.players.forEach((player) => player.seek(this.frame));
   }
 

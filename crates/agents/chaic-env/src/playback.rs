@@ -98,7 +98,7 @@ impl<T: Deref<Target = Trace>> Playback<T> {
     /// If the trace does not fit the world: a digest differs, or an agent decides at the wrong time.
     pub fn step(&mut self) -> Result<Option<Vec<Event>>> {
         let frame = self.world.state().frame;
-        if self.world.is_over() || frame >= self.last_frame {
+        if self.world.is_over() {
             return Ok(None);
         }
         while let Some(next) = self.next_decision().filter(|next| next.frame == frame) {
@@ -115,6 +115,9 @@ impl<T: Deref<Target = Trace>> Playback<T> {
         }
         if let Some(late) = self.next_decision().map(|d| d.frame).filter(|late| *late <= frame) {
             return Err(self.altered(format!("a decision of frame {late} comes too late")));
+        }
+        if frame >= self.last_frame {
+            return Ok(None);
         }
         self.world.tick();
         Ok(Some(self.world.drain_events()))

@@ -152,11 +152,12 @@ impl LiveSession {
     /// If the episode is unreadable, or a helper or seat does not exist.
     pub fn start(episode: &[u8], config: &LiveConfig) -> Result<LiveSession, LiveError> {
         let episode = Episode::parse(episode, "episode")?;
-        LiveSession::of_episode(&episode, config)
+        LiveSession::with(EpisodeConfig::new(&episode, PERSON), config)
     }
 
-    fn of_episode(episode: &Episode, config: &LiveConfig) -> Result<LiveSession, LiveError> {
-        let rules = RuleSet::PAPER;
+    /// Starts an episode with the rules, image size and appearance of `base`.
+    fn with(base: EpisodeConfig<'_>, config: &LiveConfig) -> Result<LiveSession, LiveError> {
+        let rules = base.rules;
         let (grants, is_helper) = match config.seat {
             AgentId::PARTNER => (partners::partner_grants(rules.planner), false),
             AgentId::HELPER => (Grants::PLANNER, true),
@@ -175,8 +176,7 @@ impl LiveSession {
         };
         let name = if is_helper { PERSON } else { config.helper.as_str() };
         let partner = (!is_helper).then_some(PERSON);
-        let env_config =
-            EpisodeConfig { seed: config.seed, partner, ..EpisodeConfig::new(episode, name) };
+        let env_config = EpisodeConfig { seed: config.seed, helper: name, partner, ..base };
         let env = Env::new(env_config, agents)?;
         let planner = (config.level == InputLevel::Plans).then(|| {
             let mut agent = PlanningAgent::with_watched(
@@ -190,7 +190,7 @@ impl LiveSession {
             Planner { agent, has_observed: false }
         });
         Ok(LiveSession {
-            scene: Scene::new(env.world().setup()),
+            scene: Scene::with_appearance(env.world().setup(), base.appearance),
             setup: env.world().setup().clone(),
             lines: Vec::new(),
             branch_of: None,
@@ -218,7 +218,15 @@ impl LiveSession {
         let episode = Episode::parse(episode, "episode")?;
         let (helper, seed) = (trace.header.helper.clone(), trace.header.seed);
         let config = LiveConfig { helper, seed, ..config.clone() };
-        let mut session = LiveSession::of_episode(&episode, &config)?;
+        let header = &trace.header;
+        let others = header.people.iter().filter(|person| person.agent != config.seat);
+        let base = EpisodeConfig {
+            rules: header.rules,
+            appearance: header.appearance,
+            image_size: others.map(|person| person.sensors.image_size).next(),
+            ..EpisodeConfig::new(&episode, PERSON)
+        };
+        let mut session = LiveSession::with(base, &config)?;
         let mut decisions = trace.decisions().filter(|d| d.agent == config.seat).peekable();
         while session.env.world().state().frame < from && session.status != LiveStatus::Ended {
             if session.run_frame()? != AdvanceOutcome::NeedsAction {

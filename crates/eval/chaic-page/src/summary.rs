@@ -225,6 +225,11 @@ fn percent(rate: f64) -> String {
     format!("{:.0} %", 100.0 * rate)
 }
 
+/// Returns the name of a helper for people.
+fn name(labels: Labels<'_>, helper: &str) -> String {
+    if helper == NONE { "No helper".to_owned() } else { labels.name(helper) }
+}
+
 /// Returns the difference of a helper to no helper.
 fn gain_of<'a>(differences: &'a [Difference], helper: &str) -> Option<&'a Difference> {
     differences.iter().find(|d| d.helper == helper && d.baseline == NONE)
@@ -255,13 +260,13 @@ fn lead(
 ) -> String {
     let Some(helper) = best else { return "No episode run is finished.".to_owned() };
     let Some(rate) = mean_rate(scores, helper) else { return String::new() };
-    let (name, rate) = (labels.name(helper), percent(rate));
+    let (title, rate) = (name(labels, helper), percent(rate));
     let Some(alone) = mean_rate(scores, NONE).filter(|_| helper != NONE) else {
-        return format!("With {name}, {rate} of the goal is delivered.");
+        return format!("With {title}, {rate} of the goal is delivered.");
     };
     let alone = percent(alone);
     let sentence = format!(
-        "With {name}, {rate} of the goal is delivered; without helper, the partner delivers {alone}."
+        "With {title}, {rate} of the goal is delivered; without helper, the partner delivers {alone}."
     );
     match gain_of(differences, helper).and_then(|difference| difference.all) {
         Some(gain) => {
@@ -290,7 +295,7 @@ fn gains(
             if granted.is_empty() { "none".to_owned() } else { granted.join(", ") }
         });
         Gain {
-            helper: labels.name(helper),
+            helper: name(labels, helper),
             grants: if helper == NONE { "–".to_owned() } else { grants },
             rate: number(mean_rate(scores, helper)),
             gain: chaic_eval::report::interval(gain),
@@ -308,7 +313,7 @@ fn score_rows(scores: &Scores, labels: Labels<'_>) -> Vec<ScoreRow> {
         let value = |key| number(Metric::from_key(key).value(score));
         Some(ScoreRow {
             task: task.info().title,
-            helper: labels.name(helper),
+            helper: name(labels, helper),
             rate: rounded(score.tr),
             interval: interval.map_or(String::new(), |[low, high]| {
                 format!("{} to {}", rounded(low), rounded(high))
@@ -334,7 +339,7 @@ fn position(rate: f64) -> f64 {
 }
 
 fn example_rule(labels: Labels<'_>, helper: Option<&str>, baseline: Option<&str>) -> String {
-    let Some(helper) = helper.map(|helper| labels.name(helper)) else { return String::new() };
+    let Some(helper) = helper.map(|helper| name(labels, helper)) else { return String::new() };
     match baseline {
         Some(_) => format!(
             "Of the episodes of {helper}, the one whose difference to the same episode without helper \
@@ -363,9 +368,9 @@ fn activities(
     }
     let agents = [(AgentId::PARTNER, "partner"), (AgentId::HELPER, "helper")];
     let places = helpers.iter().flat_map(|helper| agents.map(|agent| (helper, agent)));
-    let row = |(helper, (agent, name)): (&String, (AgentId, &'static str))| {
+    let row = |(helper, (agent, role)): (&String, (AgentId, &'static str))| {
         let totals = totals.get(&(helper.as_str(), agent))?;
-        (!totals.frames.is_empty()).then(|| ActivityRow::new(labels.name(helper), name, totals))
+        (!totals.frames.is_empty()).then(|| ActivityRow::new(name(labels, helper), role, totals))
     };
     Ok(places.filter_map(row).collect())
 }

@@ -53,6 +53,20 @@ fn an_episode_of_plans_verifies_in_each_seat() {
 }
 
 #[test]
+fn an_episode_that_is_stopped_verifies_up_to_its_last_decision() {
+    let episode = episode();
+    let config = config(AgentId::HELPER, InputLevel::Plans, "none");
+    let mut session = LiveSession::start(&episode, &config).unwrap();
+    for _ in 0..40 {
+        if session.advance(7).unwrap() == LiveStatus::Waiting {
+            session.choose_plan(0);
+        }
+    }
+    let player = ReplayPlayer::open(session.trace().as_bytes(), &episode).unwrap();
+    assert_eq!(player.info().n_verified, player.info().n_decisions);
+}
+
+#[test]
 fn a_person_who_decides_nothing_stops_the_world() {
     let config = config(AgentId::HELPER, InputLevel::Plans, "none");
     let mut session = LiveSession::start(&episode(), &config).unwrap();
@@ -110,6 +124,27 @@ fn a_branch_continues_a_trace() {
         assert!(branch.trace().contains(&format!("\"frame\":{frame}}}")), "it names the frame");
         let player = ReplayPlayer::open(branch.trace().as_bytes(), &episode).unwrap();
         assert_eq!(player.info().problem, None);
+    }
+}
+
+#[test]
+fn a_branch_has_the_image_size_of_its_trace() {
+    let bytes = episode();
+    let episode = Episode::parse(&bytes, "episode").unwrap();
+    let config_of_run =
+        EpisodeConfig { image_size: Some(128), ..EpisodeConfig::new(&episode, "rhp") };
+    let helper = helper("rhp", config_of_run.rules).unwrap();
+    let mut env = Env::new(config_of_run, helper).unwrap();
+    let mut trace = env.header().to_line() + "\n";
+    let mut sink = |record: &Record| -> Result<(), AgentError> {
+        trace += &(record.to_line() + "\n");
+        Ok(())
+    };
+    env.run(&std::sync::atomic::AtomicBool::new(false), Some(400), &mut sink).unwrap();
+    for seat in [AgentId::PARTNER, AgentId::HELPER] {
+        let config = config(seat, InputLevel::Plans, "none");
+        let branch = LiveSession::take_over(trace.as_bytes(), &bytes, 350, &config);
+        assert_eq!(branch.unwrap().state().frame, 350);
     }
 }
 

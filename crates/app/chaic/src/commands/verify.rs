@@ -32,10 +32,6 @@ pub fn run(arguments: &VerifyArguments, format: OutputFormat) -> Result<ExitStat
     if verdict.agreeing + verdict.mismatches.len() + verdict.findings.len() == 0 {
         anyhow::bail!("{} has no trace to verify", arguments.run.display());
     }
-    print(&verdict, format)
-}
-
-fn print(verdict: &VerificationReport, format: OutputFormat) -> Result<ExitStatus> {
     for warning in &verdict.warnings {
         print_warning(&warning.to_string());
     }
@@ -43,26 +39,26 @@ fn print(verdict: &VerificationReport, format: OutputFormat) -> Result<ExitStatu
         verdict.mismatches.iter().map(|mismatch| format!("DIFFERS {mismatch}\n")).collect();
     let findings: Vec<String> =
         verdict.findings.iter().map(|finding| format!("FOUND {finding}\n")).collect();
-    let text = differences.concat() + &findings.concat() + &summary(verdict) + "\n";
-    print_result(format, &to_json(verdict), &text)?;
+    let text = differences.concat() + &findings.concat() + &summary(&verdict) + "\n";
+    print_result(format, &to_json(&verdict), &text)?;
     Ok(ExitStatus::from_findings(!verdict.is_good()))
 }
 
 /// Replays a trace that belongs to no run, such as that of a game in a browser.
 fn verify_file(path: &Path, format: OutputFormat) -> Result<ExitStatus> {
     let (trace, warnings) = trace_file::read(path)?;
+    warnings.iter().for_each(|warning| print_warning(&warning.to_string()));
     let episode = find_episode(&trace.header.episode)?;
-    let verdict = VerificationReport {
-        agreeing: 1,
-        decisions: trace.decisions().count(),
-        warnings,
-        ..VerificationReport::default()
+    let mismatch = verify(&trace, &episode, path)?;
+    let decisions = trace.decisions().count();
+    let problem = mismatch.as_ref().map(ToString::to_string);
+    let text = match &problem {
+        Some(problem) => format!("DIFFERS {problem}\n"),
+        None => format!("{}: all digests agree\n", counted(decisions, "decision")),
     };
-    let verdict = match verify(&trace, &episode, path)? {
-        Some(mismatch) => VerificationReport { agreeing: 0, mismatches: vec![mismatch], ..verdict },
-        None => verdict,
-    };
-    print(&verdict, format)
+    let json = json!({ "passed": problem.is_none(), "decisions": decisions, "problem": problem });
+    print_result(format, &json, &text)?;
+    Ok(ExitStatus::from_findings(problem.is_some()))
 }
 
 fn to_json(verdict: &VerificationReport) -> serde_json::Value {

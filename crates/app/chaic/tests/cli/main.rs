@@ -99,9 +99,8 @@ fn a_run_from_end_to_end() {
     for word in ["Transport rate", "RHP", "Moving", "run/report.md"] {
         assert!(printed.contains(word), "{word}: {printed}");
     }
-    for file in
-        ["run.json", "results.jsonl", "scores.json", "report.md", "figure.svg", "figure.png"]
-    {
+    let report = ["scores.json", "report.md", "report.html", "figure.svg", "figure.png"];
+    for file in ["run.json", "results.jsonl"].into_iter().chain(report) {
         assert!(at.join("run").join(file).exists(), "{file}");
     }
 

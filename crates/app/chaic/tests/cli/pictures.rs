@@ -22,6 +22,10 @@ fn a_page_contains_the_replays_of_a_run_and_runs_are_compared() {
     let dir = short_episodes();
     let at = dir.path();
     run_ok(at, &EVAL);
+    let report = fs::read_to_string(at.join("run/report.html")).expect("a text file");
+    // Two episodes with and without helper.
+    assert_eq!(report.matches("class=\"chaic-replay\"").count(), 4);
+    assert!(report.contains("Watch from") && report.contains("chaic eval --helper none,rhp"));
     assert!(run_ok(at, &["view", "run"]).contains("4 replays of"));
     let page = fs::read_to_string(at.join("run/view.html")).expect("a text file");
     assert_eq!(page.matches("class=\"chaic-replay\"").count(), 4);
@@ -39,6 +43,29 @@ fn a_page_contains_the_replays_of_a_run_and_runs_are_compared() {
     assert!(table.contains("TR minus that in again") && table.contains("RHP"), "{table}");
     let error = run_err(at, &["report", "run", "--baseline", "again", "--format", "csv"]);
     assert!(error.contains("choose --format text or md"), "{error}");
+}
+
+#[test]
+fn a_page_to_play_and_single_traces() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let at = dir.path();
+    let episode = "low_target/test/00/wheelchair";
+    assert!(run_ok(at, &["play", episode]).contains("1 episode in"));
+    let page = fs::read_to_string(at.join("play.html")).expect("a text file");
+    assert!(page.contains("id=\"game\"") && page.contains("<option>infer</option>"));
+    assert!(run_err(at, &["play", "low_target/test/99"]).contains("low_target/test/99"));
+
+    let eval = ["eval", "--task", "low_target", "--n-episodes", "1", "--helper", "none"];
+    run_ok(at, &[&eval[..], &["--size", "32", "--out", "run"]].concat());
+    let trace = "run/traces/low_target/none/test-00-s0.jsonl";
+    assert!(run_ok(at, &["verify", trace]).contains("decisions: all digests agree"));
+    let text = fs::read_to_string(at.join(trace)).expect("a text file");
+    fs::write(at.join("altered.jsonl"), text.replacen("turn_left", "turn_right", 1))
+        .expect("written");
+    let output = output_of(at, &["verify", "altered.jsonl"]);
+    assert!(!output.status.success() && text(&output.stdout).contains("DIFFERS altered.jsonl"));
+    fs::write(at.join("foreign.jsonl"), "{}\n").expect("written");
+    assert!(run_err(at, &["verify", "foreign.jsonl"]).contains("foreign.jsonl"));
 }
 
 #[test]

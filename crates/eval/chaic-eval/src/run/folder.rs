@@ -37,7 +37,7 @@ const TRACE_DEPTH: u32 = 2;
 /// File name of the journal.
 const RESULTS: &str = "results.jsonl";
 /// File names of a report.
-const REPORT: [&str; 5] = ["scores.json", "report.md", "figure.svg", "figure.png", "report.html"];
+const REPORT: [&str; 4] = ["scores.json", "report.md", "figure.svg", "figure.png"];
 /// Marker file of a merge in progress. It is removed after `run.json` is written.
 const MERGING: &str = ".merging";
 /// Files in [`RECORDS`] before the first query.

@@ -22,7 +22,7 @@ pub(super) const EXAMPLES: &[CommandExamples] = &[
         [
             ("Write a page with an episode of each task", "chaic play"),
             ("Choose the episodes", "chaic play obstacle/test/00 shopping/gen/7 --out play.html"),
-            ("Play for another kind of person", "chaic play low_target/test/00/wheelchair_user"),
+            ("Play for another kind of person", "chaic play low_target/test/00/wheelchair"),
         ],
     ),
     (

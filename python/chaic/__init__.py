@@ -35,7 +35,7 @@ from chaic._chaic import (
 from chaic.episodes import EpisodeSource
 from chaic.pictures import camera, render, show
 from chaic.registry import register as _register
-from chaic.runs import Helper, Run, evaluate, merge
+from chaic.runs import Helper, Run, evaluate, merge, play
 
 __all__ = [
     "ACTIONS",
@@ -62,6 +62,7 @@ __all__ = [
     "episode_ids",
     "evaluate",
     "merge",
+    "play",
     "render",
     "show",
     "tasks",

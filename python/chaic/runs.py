@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import html
 import json
 import os
 import re
@@ -219,6 +220,21 @@ class Replay:
         return f"Replay({str(self.path)!r})"
 
 
+class Page:
+    """HTML page; notebooks show it in a frame. It needs no network."""
+
+    def __init__(self, path: Path) -> None:
+        #: HTML file.
+        self.path = path
+
+    def _repr_html_(self) -> str:
+        content = html.escape(self.path.read_text(encoding="utf-8"))
+        return f'<iframe title="chaic" style="border:0;height:60rem;width:100%" srcdoc="{content}"></iframe>'
+
+    def __repr__(self) -> str:
+        return f"Page({str(self.path)!r})"
+
+
 class Run:
     """Folder of a run, with its results."""
 
@@ -302,11 +318,38 @@ class Run:
         _command("replay", str(self.path), episode, *arguments, "--out", str(out))
         return Replay(Path(out))
 
+    def view(
+        self,
+        episode: str | None = None,
+        *,
+        helper: str | None = None,
+        out: str | os.PathLike[str] | None = None,
+    ) -> Page:
+        """Writes a page with replays of an episode or of the whole run, to a temporary file by default."""
+        path = _page_path(out)
+        arguments = [episode] if episode is not None else []
+        if helper is not None:
+            arguments += ["--helper", helper]
+        _command("view", str(self.path), *arguments, "--out", str(path))
+        return Page(path)
+
     def _repr_html_(self) -> str:
         return f"<pre>{self.report()}</pre>"
 
     def __repr__(self) -> str:
         return f"Run({str(self.path)!r})"
+
+
+def play(*episodes: str, out: str | os.PathLike[str] | None = None) -> Page:
+    """Writes a page in which a person plays these episodes as partner or helper; without any, a test episode of each
+    task. The page is a temporary file by default."""
+    path = _page_path(out)
+    _command("play", *episodes, "--out", str(path))
+    return Page(path)
+
+
+def _page_path(out: str | os.PathLike[str] | None) -> Path:
+    return Path(out) if out is not None else Path(tempfile.mkdtemp(prefix="chaic-page-")) / "page.html"
 
 
 def _command(*arguments: str) -> str:

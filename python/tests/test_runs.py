@@ -50,8 +50,14 @@ def test_a_python_helper_is_scored_and_verified(tmp_path):
     assert not records["broke_down"].any() and (records["total"] > 0).all()
     assert run.options["helpers"] == ["none", "turner"]
     assert "turner" in run.report()
-    assert "turner" in (tmp_path / "run" / "report.md").read_text()
+    for name in ["report.md", "report.html"]:
+        assert "turner" in (tmp_path / "run" / name).read_text().lower()
     run.verify()
+    page = run.view(helper="turner")
+    assert page.path.read_text().count('class="chaic-replay"') == 1
+    assert "srcdoc=" in page._repr_html_()
+    with pytest.raises(RuntimeError, match="obstacle/test/00"):
+        run.view("obstacle/test/00")
     with pytest.raises(RuntimeError):
         chaic.evaluate(Turner, out=tmp_path / "run", **OPTIONS)
 
@@ -147,6 +153,11 @@ def test_the_hidden_track_refuses_grants_and_is_recorded(tmp_path):
     run = chaic.evaluate(Turner, track="hidden", out=tmp_path / "run", **OPTIONS)
     assert run.options["track"] == "hidden"
     run.verify()
+
+
+def test_a_page_to_play_has_the_named_episodes(tmp_path):
+    page = chaic.play("shopping/gen/7", out=tmp_path / "play.html")
+    assert "shopping/gen/7" in (tmp_path / "play.html").read_text() and page.path.is_file()
 
 
 def test_records_match_results(tmp_path):

@@ -170,8 +170,8 @@ export class ChaicPlay extends LitElement {
 
   /** Moves the focus to the first plan, unless the person is elsewhere on the page. */
   private focusChoices(): void {
-    const active = this.shadowRoot?.activeElement ?? (document.activeElement === document.body ? null : undefined);
-    if (active === undefined && !this.contains(document.activeElement)) return;
+    const focused = document.activeElement;
+    if (focused !== document.body && focused !== this) return;
     this.shadowRoot?.querySelector<HTMLButtonElement>(".plans button")?.focus();
   }
 
@@ -230,7 +230,7 @@ export class ChaicPlay extends LitElement {
     event.preventDefault();
   }
 
-  /** Offers one button after the other to users of a single switch: any key presses the offered one. */
+  /** Focuses one plan after the other, so that users of a single switch only press Enter. */
   private scan(isOn: boolean): void {
     clearInterval(this.scanTimer);
     this.scanned = isOn ? 0 : undefined;

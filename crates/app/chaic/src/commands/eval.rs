@@ -10,7 +10,7 @@ use chaic_eval::report::write_files;
 use chaic_eval::run::{FolderMode, Run, RunFolder, RunRequest, Shard};
 use chaic_learn::helpers::{NamedPolicy, PolicyRegistry};
 use chaic_llm::LanguageHelpers;
-use chaic_page::write_report;
+use chaic_page::{REPORT_FILE, write_report};
 use chaic_sandbox::Launcher;
 use chaic_subprocess::{CommandRegistry, HelperProgram};
 
@@ -142,7 +142,10 @@ fn finish(run: &Run, format: OutputFormat, start: Instant) -> Result<ExitStatus>
     write_report(run.folder(), &report)?;
     let path = quoted_path(run.folder().path());
     let secs = start.elapsed().as_secs();
-    let mut more = vec![("Time", format!("{} min {:02} s", secs / 60, secs % 60))];
+    let mut more = vec![
+        ("Page", quoted_path(&run.folder().join(REPORT_FILE))),
+        ("Time", format!("{} min {:02} s", secs / 60, secs % 60)),
+    ];
     // The order of the results depends on how long the episodes took.
     let of_rhp = run.results().iter().filter(|r| r.key.helper == "rhp").min_by_key(|r| &r.key);
     let example = of_rhp.or_else(|| run.results().iter().min_by_key(|r| &r.key));

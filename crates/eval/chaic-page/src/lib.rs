@@ -29,7 +29,8 @@ pub const REPORT_FILE: &str = "report.html";
 /// Compression level: the best one.
 const LEVEL: u8 = 9;
 
-const MODULE: &[u8] = include_bytes!("../bundle/chaic_web.wasm");
+/// Raw deflate, as the build of `web/` writes it.
+const MODULE: &[u8] = include_bytes!("../bundle/chaic_web.wasm.deflate");
 const WORKER: &str = include_str!("../bundle/worker.js");
 const SCRIPT: &str = include_str!("../bundle/page.js");
 const STYLE: &str = include_str!("page.css");
@@ -82,7 +83,7 @@ fn render(values: Value) -> String {
     environment.add_template(name, source).expect("the template is valid");
     // A closing tag in a script would end it.
     let [worker, script] = [WORKER, SCRIPT].map(|text| text.replace("</script", "<\\/script"));
-    let fixed = context! { worker, script, style => STYLE, module => encoded(MODULE) };
+    let fixed = context! { worker, script, style => STYLE, module => STANDARD.encode(MODULE) };
     let template = environment.get_template(name).expect("it was added above");
     template.render(context! { ..values, ..fixed }).expect("the template uses given values only")
 }

@@ -59,9 +59,9 @@ fn a_page_to_play_and_single_traces() {
     run_ok(at, &[&eval[..], &["--size", "32", "--out", "run"]].concat());
     let trace = "run/traces/low_target/none/test-00-s0.jsonl";
     assert!(run_ok(at, &["verify", trace]).contains("decisions: all digests agree"));
-    let text = fs::read_to_string(at.join(trace)).expect("a text file");
-    fs::write(at.join("altered.jsonl"), text.replacen("turn_left", "turn_right", 1))
-        .expect("written");
+    let recorded = fs::read_to_string(at.join(trace)).expect("a text file");
+    let altered = recorded.replacen("turn_left", "turn_right", 1);
+    fs::write(at.join("altered.jsonl"), altered).expect("written");
     let output = output_of(at, &["verify", "altered.jsonl"]);
     assert!(!output.status.success() && text(&output.stdout).contains("DIFFERS altered.jsonl"));
     fs::write(at.join("foreign.jsonl"), "{}\n").expect("written");

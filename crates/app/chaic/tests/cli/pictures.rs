@@ -25,7 +25,10 @@ fn a_page_contains_the_replays_of_a_run_and_runs_are_compared() {
     let report = fs::read_to_string(at.join("run/report.html")).expect("a text file");
     // Two episodes with and without helper.
     assert_eq!(report.matches("class=\"chaic-replay\"").count(), 4);
-    assert!(report.contains("Watch from") && report.contains("chaic eval --helper none,rhp"));
+    assert!(
+        report.contains("Watch from")
+            && report.contains("--helper none,rhp --episodes DIR --size 48")
+    );
     assert!(run_ok(at, &["view", "run"]).contains("4 replays of"));
     let page = fs::read_to_string(at.join("run/view.html")).expect("a text file");
     assert_eq!(page.matches("class=\"chaic-replay\"").count(), 4);

@@ -286,9 +286,9 @@ fn second_stage_learner(steps: u64) -> DetectorLearner {
     let config =
         DetectorTrainingConfig { steps: 0, second_stage, ..DetectorTrainingConfig::shipped(0) };
     let mut learner = DetectorLearner::new(config);
-    let shipped = include_bytes!("../weights/detector.safetensors");
-    let parameters = DetectorLearner::read_weights(&config, shipped).unwrap();
-    learner.load_parameters(parameters);
+    let first_stage = TrainedDetector { second_stage: None, ..TrainedDetector::built_in() };
+    let weights = first_stage.to_bytes().unwrap();
+    learner.load_parameters(DetectorLearner::read_weights(&config, &weights).unwrap());
     learner
 }
 

@@ -32,7 +32,7 @@ fn a_page_contains_the_replays_of_a_run_and_runs_are_compared() {
     assert!(run_ok(at, &["view", "run"]).contains("4 replays of"));
     let page = fs::read_to_string(at.join("run/view.html")).expect("a text file");
     assert_eq!(page.matches("class=\"chaic-replay\"").count(), 4);
-    assert!(page.contains("no_constraint/gen/0, rhp, seed 0"));
+    assert!(page.contains("gen&#x2f;0, rhp, seed 0"), "slashes are escaped");
     let one = ["view", "run", "gen/0", "--helper", "rhp", "--max", "1", "--out", "one.html"];
     let out = output_of(at, &one);
     assert!(text(&out.stdout).contains("1 replay of") && text(&out.stderr).contains("1 more"));

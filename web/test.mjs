@@ -13,6 +13,7 @@ import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
+import { deflateRawSync, inflateRawSync } from "node:zlib";
 import { chromium } from "playwright-core";
 
 const chaic = process.env.CHAIC ?? "chaic";
@@ -195,8 +196,7 @@ test("a comparison shows both runs, and where they diverge", async () => {
   const [, time] = /First different decision:\s+\d+:\d+\s[^]*?\(frame (\d+)\)/.exec(text);
   const frame = await page.evaluate(() => document.querySelector("chaic-compare").frame);
   assert.ok(frame <= Number(time) && frame > 0, `${frame} ${time}`);
-  // A hash of the trace's decisions would be equal before this frame: the views of the partner are.
-  const same = (at) =>
+  const partnerActions = (at) =>
     page.evaluate(async (wanted) => {
       const compare = document.querySelector("chaic-compare");
       compare.seek(wanted);
@@ -207,7 +207,7 @@ test("a comparison shows both runs, and where they diverge", async () => {
       }
       return compare.shown.map((state) => state.captions[0].action);
     }, at);
-  const [a, b] = await same(frame);
+  const [a, b] = await partnerActions(frame);
   assert.equal(a, b, "the partner does the same up to the first different decision");
   await page.locator("#other").selectOption("");
   await page.waitForFunction(() => document.querySelector("chaic-replay")?.shown);
@@ -262,6 +262,63 @@ test("a game played by keyboard verifies on the command line, and can be watched
   await shown(page);
   assert.match(await page.locator("chaic-replay .badge").innerText(), /^verified/);
   for (const url of requests) assert.match(url, /^(file|blob|data):/);
+  await page.close();
+});
+
+/** Writes a page of one episode that ends at frame `horizon`. */
+function shortGame(name, horizon) {
+  const file = join(folder, name);
+  execFileSync(chaic, ["play", "low_target/test/00", "--out", file]);
+  const text = readFileSync(file, "utf8").replace(
+    /(class="chaic-episode">)([^<]*)/,
+    (_, tag, content) => {
+      const episode = JSON.parse(inflateRawSync(Buffer.from(content, "base64")).toString());
+      episode.setup.horizon = horizon;
+      return tag + deflateRawSync(JSON.stringify(episode)).toString("base64");
+    },
+  );
+  writeFileSync(file, text);
+  return file;
+}
+
+test("a game of one switch ends with the results of the built-in helpers", async () => {
+  const { page } = await open(shortGame("switch.html", 120));
+  await page.getByLabel("Speed").selectOption("8");
+  await page.getByRole("button", { name: "Start" }).click();
+  await page.getByLabel(/for a single switch/).check();
+  const offers = (wanted) =>
+    page.waitForFunction(
+      (index) => {
+        const root = document.querySelector("chaic-play").shadowRoot;
+        return [...root.querySelectorAll(".plans button")].indexOf(root.activeElement) === index;
+      },
+      wanted,
+      { timeout: 20_000 },
+    );
+  for (const index of [1, 0]) await offers(index);
+  await page.keyboard.press("Enter");
+  await playTo(page, 120);
+  await page.waitForFunction(() => {
+    const cells = document.querySelector("chaic-play").shadowRoot.querySelectorAll("table .number");
+    return cells.length === 4 && [...cells].every((cell) => /^\d+ %$/.test(cell.textContent));
+  }, undefined, { timeout: 60_000 });
+  await page.close();
+});
+
+test("a game of steps obeys the keys, and its world goes on if it is live", async () => {
+  const { page } = await open(shortGame("steps.html", 2000));
+  await page.getByLabel("You choose").selectOption("steps");
+  await page.getByRole("button", { name: "Start" }).click();
+  const state = () => page.evaluate(() => document.querySelector("chaic-play")?.shown);
+  await page.waitForFunction(() => document.querySelector("chaic-play")?.shown?.status === "waiting");
+  await page.waitForTimeout(300);
+  assert.equal((await state()).frame, 0, "the world waits");
+  await page.locator("chaic-play .controls button").first().focus();
+  await page.keyboard.press("ArrowLeft");
+  await page.waitForFunction(() => document.querySelector("chaic-play").shown.caption.action === "turns left");
+  await page.getByLabel("While you think").selectOption("live");
+  await page.getByRole("button", { name: "Start" }).click();
+  await page.waitForFunction(() => document.querySelector("chaic-play")?.shown?.frame > 20);
   await page.close();
 });
 

@@ -12,6 +12,7 @@ import { drawnSize, MAX_PX, paint } from "./pictures.js";
 import { ReplayPlayer, type Source } from "./player.js";
 import { styles } from "./styles.js";
 import { timeline } from "./timeline.js";
+import { WidthObserver } from "./width.js";
 
 const PARTNER = 0;
 const HELPER = 1;
@@ -43,21 +44,13 @@ export class ChaicCompare extends LitElement {
     () => this.players.length === 0 || this.players.some((player) => player.isDrawing),
   );
 
-  private width = 0;
-  private readonly resizes = new ResizeObserver(() => {
-    if (this.clientWidth === this.width) return;
-    this.width = this.clientWidth;
-    this.redraw();
-  });
-
-  override connectedCallback(): void {
-    super.connectedCallback();
-    this.resizes.observe(this);
+  constructor() {
+    super();
+    new WidthObserver(this, () => this.redraw());
   }
 
   override disconnectedCallback(): void {
     super.disconnectedCallback();
-    this.resizes.disconnect();
     this.close();
   }
 

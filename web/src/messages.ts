@@ -106,9 +106,11 @@ export interface LiveInfo {
   episode: string;
   /** Empty for a person who must find out. */
   goal: string[];
+  /** Kind of person of the person's body. */
   person: string;
   reach_m: [number, number];
   strength_kg: number;
+  frames_per_second: number;
 }
 
 /** State of a played episode. */

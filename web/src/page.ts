@@ -77,23 +77,29 @@ class Replays {
   async show(wanted: Shown): Promise<void> {
     const contents = [wanted.replay, wanted.other].filter((k) => k !== undefined).map((k) => this.contents[k]);
     if (!contents.every((content) => content !== undefined)) return;
-    const isShown = this.shown?.replay === wanted.replay && this.shown.other === wanted.other;
+    const isChosen = this.isChosen(wanted);
     this.shown = wanted;
-    if (isShown) {
+    if (isChosen) {
       this.element?.seek(wanted.frame);
       return;
     }
     this.select(wanted);
     const [first, second] = await Promise.all(contents.map((content) => this.source(content)));
-    const common = { workerSource: workerSource(), start: wanted.frame };
+    // Another choice was made meanwhile.
+    if (!this.isChosen(wanted)) return;
+    const common = { workerSource: workerSource(), start: this.shown.frame };
     if (second) {
       const element = document.createElement("chaic-compare") as ChaicCompare;
       this.element = Object.assign(element, { sources: [first, second], ...common });
     } else {
-      this.element = replayElement(first!, wanted.frame);
+      this.element = replayElement(first!, this.shown.frame);
     }
     this.element.addEventListener("moved", (event) => this.moved((event as CustomEvent<number>).detail));
     this.player.replaceChildren(this.element);
+  }
+
+  private isChosen({ replay, other }: Shown): boolean {
+    return this.shown?.replay === replay && this.shown.other === other;
   }
 
   private async source(content: Element): Promise<Source> {

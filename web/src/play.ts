@@ -7,7 +7,6 @@ import type { Action, Branch, LiveConfig, LiveInfo, LiveState, Request, Response
 import { drawnSize, MAX_PX, paint } from "./pictures.js";
 import { styles } from "./styles.js";
 
-const FRAMES_PER_SECOND = 30;
 /** Side of the images in which a person points at objects, pixels. */
 const POINTING_PX = 512;
 /** Helpers whose results are laid beside the person's. */
@@ -51,7 +50,8 @@ export class ChaicPlay extends LitElement {
   @state() private story: StoryLine[] = [];
   @state() private problem?: string;
   @state() private references = new Map<string, number>();
-  @state() private scanned?: number;
+  /** True if plans are offered one after the other. */
+  @state() private isScanning = false;
   /** What a click on the picture does. */
   @state() private pointing: { kind: "pick_up" | "put_on" | "remove_obstacle"; hand: Hand } = {
     kind: "pick_up",
@@ -82,7 +82,8 @@ export class ChaicPlay extends LitElement {
     this.worker?.terminate();
     this.worker = undefined;
     clearInterval(this.scanTimer);
-    this.info = this.shown = this.problem = this.scanned = undefined;
+    this.info = this.shown = this.problem = undefined;
+    this.isScanning = false;
     this.story = [];
     this.references = new Map();
     this.isOver = false;
@@ -137,8 +138,8 @@ export class ChaicPlay extends LitElement {
   private advance(time: number): void {
     if (!this.worker || this.problem || this.isOver) return;
     // A tab in the background gets no callbacks; the episode goes on where it was.
-    const speed = this.game?.speed ?? 1;
-    this.elapsedFrames += (Math.min(time - this.lastTime, 250) / 1000) * FRAMES_PER_SECOND * speed;
+    const framesPerSecond = (this.game?.speed ?? 1) * (this.info?.frames_per_second ?? 0);
+    this.elapsedFrames += (Math.min(time - this.lastTime, 250) / 1000) * framesPerSecond;
     this.lastTime = time;
     const isWaiting = this.shown?.status === "waiting" && !this.input;
     if (isWaiting && this.game?.isLive && this.elapsedFrames >= 1) this.pause();
@@ -164,8 +165,7 @@ export class ChaicPlay extends LitElement {
     this.shown = shown;
     if (shown.events.length > 0) this.story = [...this.story, ...shown.events];
     if (shown.status === "ended") this.stop();
-    if (shown.status !== "waiting") this.scanned = this.scanned === undefined ? undefined : 0;
-    else if (!wasWaiting) void this.updateComplete.then(() => this.focusChoices());
+    if (shown.status === "waiting" && !wasWaiting) void this.updateComplete.then(() => this.focusChoices());
   }
 
   /** Moves the focus to the first plan, unless the person is elsewhere on the page. */
@@ -233,14 +233,15 @@ export class ChaicPlay extends LitElement {
   /** Focuses one plan after the other, so that users of a single switch only press Enter. */
   private scan(isOn: boolean): void {
     clearInterval(this.scanTimer);
-    this.scanned = isOn ? 0 : undefined;
-    if (!isOn) return;
-    this.scanTimer = window.setInterval(() => {
-      const buttons = [...this.shadowRoot!.querySelectorAll<HTMLButtonElement>(".plans button")];
-      if (buttons.length === 0) return;
-      this.scanned = ((this.scanned ?? -1) + 1) % buttons.length;
-      buttons[this.scanned]?.focus();
-    }, SCAN_MS);
+    this.isScanning = isOn;
+    if (isOn) this.scanTimer = window.setInterval(() => this.focusNext(), SCAN_MS);
+  }
+
+  private focusNext(): void {
+    const root = this.shadowRoot!;
+    const buttons = [...root.querySelectorAll<HTMLButtonElement>(".plans button")];
+    const focused = buttons.findIndex((button) => button === root.activeElement);
+    buttons[(focused + 1) % buttons.length]?.focus();
   }
 
   override render(): TemplateResult {
@@ -274,7 +275,7 @@ export class ChaicPlay extends LitElement {
     const isHelper = this.game?.config.seat === 1;
     const [low, high] = info.reach_m.map((m) => m.toFixed(2));
     const goal = isHelper
-      ? `The partner (${info.person}) wants something that you do not know. Find out and help.`
+      ? "The partner wants something that you do not know. Find out and help."
       : `You are a ${info.person} and want ${info.goal.join(", ")}.`;
     return html`<header>
       <h2>${info.task}: you are the ${isHelper ? "helper" : "partner"}</h2>
@@ -283,19 +284,22 @@ export class ChaicPlay extends LitElement {
     </header>`;
   }
 
+  private time(frame: number): string {
+    return clock(frame, this.info?.frames_per_second ?? 1);
+  }
+
   private status(shown: LiveState): TemplateResult {
     const { action, plan } = shown.caption;
     const hands = shown.hands.map((held) => held ?? "nothing");
     const delivered = shown.progress ? `, ${shown.progress[0]} of ${shown.progress[1]} delivered` : "";
     return html`<p class="time">
-        ${clock(shown.frame, FRAMES_PER_SECOND)} of ${clock(shown.horizon, FRAMES_PER_SECOND)}${delivered}
+        ${this.time(shown.frame)} of ${this.time(shown.horizon)}${delivered}
       </p>
       <p>Left hand: ${hands[0]}; right hand: ${hands[1]}</p>
       <p role="status">You: ${action}${plan ? ` (${plan})` : ""}${shown.failure ? `; failed: ${shown.failure}` : ""}</p>`;
   }
 
   private plans(shown: LiveState | undefined): TemplateResult {
-    const isScanning = this.scanned !== undefined;
     return html`<h3>What next?</h3>
       <ol class="plans">
         ${(shown?.plans ?? []).map(
@@ -307,7 +311,7 @@ export class ChaicPlay extends LitElement {
       <label>
         <input
           type="checkbox"
-          .checked=${isScanning}
+          .checked=${this.isScanning}
           @change=${(event: Event) => this.scan((event.target as HTMLInputElement).checked)}
         />
         Offer one plan after the other, for a single switch
@@ -365,7 +369,7 @@ export class ChaicPlay extends LitElement {
       <h3>Events</h3>
       <ol reversed>
         ${[...this.story].reverse().map(
-          (line) => html`<li><span class="time">${clock(line.frame, FRAMES_PER_SECOND)}</span> ${line.text}</li>`,
+          (line) => html`<li><span class="time">${this.time(line.frame)}</span> ${line.text}</li>`,
         )}
       </ol>
     </div>`;

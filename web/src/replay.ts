@@ -11,6 +11,7 @@ import { drawnSize, MAX_PX, paint } from "./pictures.js";
 import { ReplayPlayer, type DrawnFrame, type Source, type Wanted } from "./player.js";
 import { styles } from "./styles.js";
 import { timeline } from "./timeline.js";
+import { WidthObserver } from "./width.js";
 
 /** Largest number of hypotheses of a belief that are listed. */
 const MAX_BARS = 5;
@@ -40,22 +41,13 @@ export class ChaicReplay extends LitElement {
     () => this.player?.isDrawing ?? true,
   );
 
-  private width = 0;
-  // Redraws in the new size; the height depends on the content.
-  private readonly resizes = new ResizeObserver(() => {
-    if (this.clientWidth === this.width) return;
-    this.width = this.clientWidth;
-    this.player?.seek(this.frame);
-  });
-
-  override connectedCallback(): void {
-    super.connectedCallback();
-    this.resizes.observe(this);
+  constructor() {
+    super();
+    new WidthObserver(this, () => this.player?.seek(this.frame));
   }
 
   override disconnectedCallback(): void {
     super.disconnectedCallback();
-    this.resizes.disconnect();
     this.player?.close();
     this.player = undefined;
   }

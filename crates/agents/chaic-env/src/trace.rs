@@ -141,7 +141,7 @@ pub struct Participant {
     /// Digest of its weights; absent for an agent without trained weights.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weights: Option<String>,
-    /// What a person decides who controls it: `plans` or `steps`; absent for a program.
+    /// Level of the decisions if a person controls it, `plans` or `steps`; absent for a program.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub input: Option<String>,
 }

@@ -5,7 +5,9 @@ use chaic_agents::policies::ExternalPolicy;
 use chaic_agents::{PlanningAgent, partners};
 use chaic_core::agent::Thought;
 use chaic_core::observation::{Grants, Held, SensorConfig};
-use chaic_core::{Action, Agent as _, AgentError, AgentId, Frame, Hand, Outcome, Target};
+use chaic_core::{
+    Action, Agent as _, AgentError, AgentId, FRAMES_PER_SECOND, Frame, Hand, Outcome, Target,
+};
 use chaic_env::helper_registry::{Helper, NONE, built_in};
 use chaic_env::narration::{Caption, event_text, object_name};
 use chaic_env::rules::RuleSet;
@@ -14,7 +16,7 @@ use chaic_env::{
     AdvanceOutcome, AgentSlot, Digest, Env, EnvError, EpisodeAgents, EpisodeConfig, Playback,
 };
 use chaic_episodes::{Episode, EpisodeError};
-use chaic_render::{Channels, Scene, View, floor_plan};
+use chaic_render::{Channels, Scene, View};
 use chaic_world::{EventKind, Setup};
 use serde::{Deserialize, Serialize};
 
@@ -57,7 +59,7 @@ pub enum InputLevel {
     Steps,
 }
 
-/// What is played, and by whom.
+/// Seat, level of input and helper of a played episode.
 #[derive(Clone, Debug, Deserialize)]
 pub struct LiveConfig {
     /// Index of the seed.
@@ -114,12 +116,14 @@ pub struct LiveInfo {
     pub episode: String,
     /// Wanted objects, for example `3 apple`; empty for a person who must find out.
     pub goal: Vec<String>,
-    /// Kind of person of the partner.
+    /// Kind of person of the person's body: a helper does not learn the partner's.
     pub person: String,
     /// Lowest and highest reach of the person's body, meters.
     pub reach_m: [f32; 2],
     /// Maximum mass that the person's body lifts, kilograms.
     pub strength_kg: f32,
+    /// Frames per second of simulated time.
+    pub frames_per_second: Frame,
 }
 
 /// Episode that a person plays.
@@ -256,9 +260,10 @@ impl LiveSession {
             task: header.task.info().title,
             episode: header.episode.clone(),
             goal,
-            person: setup.people[AgentId::PARTNER.index()].kind().to_string(),
+            person: setup.people[self.seat.index()].kind().to_string(),
             reach_m: body.pick_range_m,
             strength_kg: body.strength_kg,
+            frames_per_second: FRAMES_PER_SECOND,
         }
     }
 
@@ -422,12 +427,6 @@ impl LiveSession {
         let images = self.scene.render(self.env.world(), &[view]);
         let rgb = images.into_iter().next().and_then(|images| images.rgb).unwrap_or_default();
         DrawnImage::from_rgb(side_px, side_px, &rgb)
-    }
-
-    /// Draws the map of the whole place, for viewers after the end of the episode.
-    pub fn draw_map(&self, width_px: u32) -> DrawnImage {
-        let map = floor_plan::draw_scene_plan(&self.scene, self.env.world(), width_px);
-        DrawnImage::from_rgb(map.width(), map.height(), map.as_raw())
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use chaic_core::agent::PartnerBelief;
 use chaic_core::geom::to_xz;
-use chaic_core::{AgentId, Frame, Vec2};
+use chaic_core::{AgentId, FRAMES_PER_SECOND, Frame, Vec2};
 use chaic_env::narration::{Caption, action_text};
 use chaic_env::trace::{Decision, Trace, parse};
 use chaic_env::{EnvError, Playback};
@@ -239,8 +239,6 @@ impl ReplayInfo {
         timeline: Timeline,
         trails: Vec<Vec<[f32; 2]>>,
     ) -> ReplayInfo {
-        /// Frames per second of simulated time (docs/rules.md, time).
-        const FRAMES_PER_SECOND: u32 = 30;
         let (header, world) = (playback.header(), playback.world());
         let setup = world.setup();
         let agent = |(id, person): (AgentId, &chaic_world::AgentSpec)| {

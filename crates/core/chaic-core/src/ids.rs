@@ -8,8 +8,11 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 use crate::catalogue::{self, ClassInfo};
 
-/// Number of frames since the start of the episode; 30 frames are one second of walking.
+/// Number of frames since the start of the episode; [`FRAMES_PER_SECOND`] are one second of walking.
 pub type Frame = u32;
+
+/// Number of frames in a second of simulated time (docs/rules.md, time).
+pub const FRAMES_PER_SECOND: Frame = 30;
 
 /// Id of an entity of an episode, and the value of its pixels in an id image.
 ///

@@ -33,6 +33,6 @@ pub use agent::{Agent, AgentError};
 pub use briefing::Briefing;
 pub use catalogue::{ClassInfo, Role};
 pub use glam::{Quat, Vec2, Vec3};
-pub use ids::{AgentId, ClassId, EntityId, Frame};
+pub use ids::{AgentId, ClassId, EntityId, FRAMES_PER_SECOND, Frame};
 pub use observation::Observation;
 pub use task::TaskId;

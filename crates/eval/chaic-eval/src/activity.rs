@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use chaic_core::{Action, AgentId, Outcome};
+use chaic_core::{AgentId, Frame, Outcome};
 use chaic_env::narration::ActivityKind;
 use chaic_env::trace::{Record, Trace};
 use chaic_world::EventKind;
@@ -35,7 +35,7 @@ impl ActivityTotals {
         }
     }
 
-    fn add_time(&mut self, last: Option<(u32, ActivityKind)>, until: u32) {
+    fn add_time(&mut self, last: Option<(Frame, ActivityKind)>, until: Frame) {
         if let Some((frame, kind)) = last {
             *self.frames.entry(kind).or_default() += u64::from(until.saturating_sub(frame));
         }
@@ -43,8 +43,7 @@ impl ActivityTotals {
 
     fn add_event(&mut self, event: &EventKind, of: AgentId) {
         let EventKind::Ended { agent, action, outcome } = event else { return };
-        let is_attempt = !action.is_locomotion() && !matches!(action, Action::Wait { .. });
-        if *agent != of || !is_attempt {
+        if *agent != of || ActivityKind::of(action) != ActivityKind::Interact {
             return;
         }
         self.attempts += 1;

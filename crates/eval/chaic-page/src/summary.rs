@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use chaic_core::{AgentId, TaskId};
+use chaic_core::{AgentId, FRAMES_PER_SECOND, Frame, TaskId};
 use chaic_env::RunKey;
 use chaic_env::helper_registry::NONE;
 use chaic_env::narration::ActivityKind;
@@ -18,9 +18,6 @@ use serde::Serialize;
 
 use crate::data_link;
 use crate::replays::PageReplay;
-
-/// Frames per second of simulated time (docs/rules.md, time).
-const FRAMES_PER_SECOND: u32 = 30;
 
 /// Report of a run for people.
 #[derive(Clone, Debug, Serialize)]
@@ -39,7 +36,7 @@ pub struct RunSummary {
     pub examples: Vec<ExampleRow>,
     /// Time by activity and failures, per helper and agent; empty without traces.
     pub activities: Vec<ActivityRow>,
-    /// What the figures cannot tell.
+    /// Limits of the figures.
     pub notes: Vec<String>,
     /// Command that repeats the run.
     pub command: String,
@@ -99,7 +96,7 @@ pub struct Span {
 pub struct ExampleRow {
     /// Why it is shown.
     pub heading: &'static str,
-    /// What happens.
+    /// Description of the episode and its result.
     pub text: String,
     /// Address of its turning point; absent without a trace.
     pub link: Option<String>,
@@ -109,8 +106,6 @@ pub struct ExampleRow {
     pub time: String,
     #[serde(skip)]
     example: Example,
-    #[serde(skip)]
-    baseline: Option<String>,
 }
 
 /// Time by activity and failures of one agent.
@@ -149,7 +144,7 @@ impl RunSummary {
             has_paper: rows.iter().any(|row| row.span.paper.is_some()),
             scores: rows,
             example_rule: example_rule(labels, best.as_deref(), baseline),
-            examples: examples.map(|example| ExampleRow::new(example, baseline)).collect(),
+            examples: examples.map(ExampleRow::new).collect(),
             activities: activities(folder, report, labels, &helpers)?,
             notes: notes(report, &helpers),
             command: report.options.command(),
@@ -184,7 +179,7 @@ impl RunSummary {
 }
 
 impl ExampleRow {
-    fn new(example: Example, baseline: Option<&str>) -> ExampleRow {
+    fn new(example: Example) -> ExampleRow {
         let heading = match example.role {
             ExampleRole::Typical => "Typical",
             ExampleRole::Best => "Best",
@@ -203,20 +198,19 @@ impl ExampleRow {
             link: None,
             comparison_link: None,
             time: clock(example.frame),
-            baseline: baseline.map(str::to_owned),
             example,
         }
     }
 
-    /// Returns the baseline's run on the same episode and seed.
+    /// Returns the run without helper on the same episode and seed, if it is the baseline.
     fn baseline_key(&self) -> Option<RunKey> {
-        let helper = self.baseline.clone()?;
-        Some(RunKey { helper, ..self.example.key.clone() })
+        self.example.baseline_rate?;
+        Some(RunKey { helper: NONE.to_owned(), ..self.example.key.clone() })
     }
 }
 
 /// Formats a frame as minutes and seconds.
-fn clock(frame: u32) -> String {
+fn clock(frame: Frame) -> String {
     let seconds = frame / FRAMES_PER_SECOND;
     format!("{}:{:02}", seconds / 60, seconds % 60)
 }

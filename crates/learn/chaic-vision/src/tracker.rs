@@ -4,6 +4,7 @@
 //! carried object may have moved by walking speed; a released object lies near the agent. The agent
 //! knows its own held objects from proprioception: they are no detections.
 
+mod masks;
 mod plan_extent;
 
 use std::collections::BTreeMap;
@@ -11,9 +12,10 @@ use std::collections::BTreeMap;
 use chaic_agents::perception::{Detection, PixelKind, SegmentMeasurement};
 use chaic_agents::track::{Hands, Intent, TrackId};
 use chaic_core::briefing::{Companion, CompanionRole};
-use chaic_core::geom::{Camera, Pose, horizontal_distance, rotate_yaw};
-use chaic_core::{Action, AgentId, Briefing, ClassId, EntityId, Frame, Hand, Outcome, Vec2, Vec3};
+use chaic_core::geom::{Camera, Pose, horizontal_distance};
+use chaic_core::{Action, AgentId, Briefing, ClassId, EntityId, Frame, Outcome, Vec2, Vec3};
 
+use self::masks::is_within;
 use self::plan_extent::PlanExtent;
 use crate::labels::{class_of, n_labels};
 use crate::loss::{exp, ln, sigmoid};
@@ -247,97 +249,6 @@ impl Tracker {
             let is_removed_obstacle = self.removed_obstacle == Some(track.id);
             if held_before.contains(&track.id) && !is_held || is_removed_obstacle {
                 (track.is_released, track.position, track.last_seen) = (true, pose.position, now);
-            }
-        }
-    }
-
-    /// Boxes of held objects in the body's frame: centers and half extents, meters.
-    fn held_boxes(&self) -> Vec<(Vec3, Vec3)> {
-        /// Margin around the extents of the class, meters.
-        const MARGIN_M: f32 = 0.1;
-        /// Height of the contents above the center of their container, meters.
-        const CONTENTS_M: f32 = 0.4;
-        /// Half extent of an unknown object, meters.
-        const UNKNOWN_M: f32 = 0.25;
-        let half = |class: Option<ClassId>| {
-            let size = class.map_or([2.0 * UNKNOWN_M; 3], |class| class.info().size_m);
-            let across = 0.5 * size[0].max(size[2]);
-            Vec3::new(across, 0.5 * size[1], across) + Vec3::splat(MARGIN_M)
-        };
-        let height_m = self.height_m;
-        if self.hands.is_joint {
-            // In front of the body, at any height.
-            let half = half(self.hands.held().next().and_then(|held| held.class()));
-            let center = Vec3::new(0.0, 0.5 * height_m, -(0.3 + half.z));
-            return vec![(center, Vec3::new(half.x, height_m, half.z + 0.3))];
-        }
-        let in_hand = |hand: Hand| {
-            let held = self.hands.hands[hand.index()].as_ref()?;
-            let side = if hand == Hand::Left { -1.0 } else { 1.0 };
-            // Position of held objects, relative to the body's height.
-            let center = Vec3::new(side * 0.2, 0.57 * height_m, -0.31 * height_m);
-            // Contents stand out of their container.
-            let above_m = if held.n_contents > 0 { 0.5 * CONTENTS_M } else { 0.0 };
-            Some((center + above_m * Vec3::Y, half(held.class()) + above_m * Vec3::Y))
-        };
-        Hand::BOTH.into_iter().filter_map(in_hand).collect()
-    }
-
-    /// Sets a mask where the image shows held objects, regardless of their detected class: shape
-    /// [height / stride, width / stride], rounded up.
-    pub fn mask_held(
-        &self,
-        pose: Pose,
-        depth_m: &[f32],
-        camera: &Camera,
-        stride: u32,
-        mask: &mut [bool],
-    ) {
-        let boxes = self.held_boxes();
-        if boxes.is_empty() {
-            return;
-        }
-        let (width, stride) = (camera.width as usize, stride as usize);
-        let max_distance_m =
-            boxes.iter().map(|(at, half)| (*at + *half).length().max((*at - *half).length()));
-        let max_distance_m = max_distance_m.fold(0.0, f32::max);
-        let columns = width.div_ceil(stride);
-        for (k, is_dynamic) in mask.iter_mut().enumerate() {
-            let (x, y) = (stride * (k % columns), stride * (k / columns));
-            let depth = depth_m[y * width + x];
-            if depth < max_distance_m && !*is_dynamic {
-                let point = camera.unproject(x as u32, y as u32, depth);
-                *is_dynamic = is_within(&boxes, point, pose);
-            }
-        }
-    }
-
-    /// Sets a mask where the image shows points within large movable objects, also those that the
-    /// detector missed: the static map would keep them after the object has moved. The shape is that
-    /// of [`Tracker::mask_held`].
-    pub fn mask_movables(&self, depth_m: &[f32], camera: &Camera, stride: u32, mask: &mut [bool]) {
-        /// Distance around the extent in which points belong to the object, meters: points from above
-        /// are 0.125 m apart.
-        const MARGIN_M: f32 = 0.15;
-        /// Points below are floor, meters, and points above belong to no movable object.
-        const HEIGHT_M: [f32; 2] = [0.08, 2.0];
-        let is_known = |track: &&Track| {
-            let is_movable = pixel_kind(track.label) == PixelKind::Movable;
-            is_movable && !track.is_released && track.log_odds > self.config.report_log_odds
-        };
-        let extents: Vec<PlanExtent> =
-            self.tracks.iter().filter(is_known).filter_map(|track| track.extent).collect();
-        if extents.is_empty() {
-            return;
-        }
-        let (width, stride) = (camera.width as usize, stride as usize);
-        let columns = width.div_ceil(stride);
-        for (k, is_dynamic) in mask.iter_mut().enumerate().filter(|(_, is_dynamic)| !**is_dynamic) {
-            let (x, y) = (stride * (k % columns), stride * (k / columns));
-            let point = camera.unproject(x as u32, y as u32, depth_m[y * width + x]);
-            if point.y > HEIGHT_M[0] && point.y < HEIGHT_M[1] {
-                let at = Vec2::new(point.x, point.z);
-                *is_dynamic = extents.iter().any(|extent| extent.contains(at, MARGIN_M));
             }
         }
     }
@@ -612,12 +523,6 @@ fn pixel_kind(label: u8) -> PixelKind {
 
 fn extents_m(label: u8) -> [f32; 3] {
     class_of(label).map_or([0.0; 3], |class| class.info().size_m)
-}
-
-/// True if a point in the world's frame is inside of one of the boxes in a body's frame.
-fn is_within(boxes: &[(Vec3, Vec3)], point: Vec3, body: Pose) -> bool {
-    let p = rotate_yaw(point - body.position, -body.yaw_rad);
-    boxes.iter().any(|(at, half)| (p - *at).abs().cmplt(*half).all())
 }
 
 #[cfg(test)]

@@ -99,6 +99,23 @@ fn interruptions_change_nothing() {
 }
 
 #[test]
+fn single_frames_give_the_same_records() {
+    let episode = test_episode(TaskId::Shopping);
+    let whole = run_all(&mut Env::new(config(&episode), Some(rhp())).unwrap());
+    let mut env = Env::new(config(&episode), Some(rhp())).unwrap();
+    let mut records = Vec::new();
+    for frame in 0..UNTIL {
+        assert_eq!(env.world().state().frame, frame);
+        let mut sink = |record: &Record| {
+            records.push(record.clone());
+            Ok::<(), AgentError>(())
+        };
+        assert_eq!(env.run_frame(&mut sink), Ok(AdvanceOutcome::Stopped));
+    }
+    assert!(records.len() > 30 && whole.starts_with(&records));
+}
+
+#[test]
 fn a_reset_environment_equals_a_new_one() {
     let tasks = [TaskId::Obstacle, TaskId::Obstacle, TaskId::Shopping, TaskId::MovingHouse];
     let mut env = Env::new(config(&test_episode(TaskId::NoConstraint)), Some(rhp())).unwrap();

@@ -42,7 +42,11 @@ fn an_episode_of_plans_verifies_in_each_seat() {
             seat == AgentId::HELPER,
             "only the partner knows the goal"
         );
+        if seat == AgentId::HELPER {
+            assert_eq!((info.person.as_str(), session.state().progress), ("helper", None));
+        }
         play(&mut session);
+        assert!(session.state().progress.is_some(), "the end tells the result");
         let player = ReplayPlayer::open(session.trace().as_bytes(), &episode).unwrap();
         let replay = player.info();
         assert_eq!((replay.n_verified, &replay.problem), (replay.n_decisions, &None));
@@ -125,6 +129,17 @@ fn a_branch_continues_a_trace() {
         let player = ReplayPlayer::open(branch.trace().as_bytes(), &episode).unwrap();
         assert_eq!(player.info().problem, None);
     }
+}
+
+#[test]
+fn a_trace_of_agents_that_act_otherwise_cannot_be_taken_over() {
+    let episode = episode();
+    let config = config(AgentId::PARTNER, InputLevel::Plans, "rhp");
+    let mut session = LiveSession::start(&episode, &config).unwrap();
+    play(&mut session);
+    let other = session.trace().replacen("\"helper\":\"rhp\"", "\"helper\":\"random\"", 1);
+    let result = LiveSession::take_over(other.as_bytes(), &episode, 600, &config);
+    assert!(matches!(result.err(), Some(LiveError::Diverged)));
 }
 
 #[test]

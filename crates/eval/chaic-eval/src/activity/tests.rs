@@ -1,6 +1,6 @@
 //! Promise: every frame after an agent's first decision belongs to one activity.
 
-use chaic_core::{EntityId, FailureReason, Hand};
+use chaic_core::{Action, EntityId, FailureReason, Hand};
 use chaic_env::trace::{Decision, End, TraceEvent};
 use chaic_env::{Digest, EpisodeConfig, trace_header};
 use chaic_episodes::find_episode;

@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-use chaic_core::{Action, AgentId, Frame};
+use chaic_core::{AgentId, Frame};
+use chaic_env::narration::ActivityKind;
 use chaic_env::trace::Record;
 use chaic_world::EventKind;
 
@@ -52,8 +53,7 @@ impl MetricAccumulator for FailureRate {
         if let Record::Event(event) = record
             && let EventKind::Ended { agent, action, outcome } = event.event.kind
             && agent == self.agent
-            && !action.is_locomotion()
-            && !matches!(action, Action::Wait { .. })
+            && ActivityKind::of(&action) == ActivityKind::Interact
         {
             self.attempts += 1;
             self.failures += u32::from(!outcome.is_success());
@@ -69,7 +69,7 @@ impl MetricAccumulator for FailureRate {
 mod tests {
     use super::*;
     use crate::metrics::Metric;
-    use chaic_core::{EntityId, FailureReason, Hand, Outcome};
+    use chaic_core::{Action, EntityId, FailureReason, Hand, Outcome};
     use chaic_env::trace::TraceEvent;
     use chaic_world::Event;
 

@@ -3,6 +3,7 @@
 //! their contents are no detections.
 
 use chaic_agents::track::Carried;
+use chaic_core::Hand;
 use chaic_core::briefing::{Companion, CompanionRole};
 use chaic_core::geom::yaw_rotation;
 

@@ -4,6 +4,7 @@ mod citations;
 mod cycles;
 mod docs;
 mod layers;
+mod licenses;
 mod prose;
 mod readme;
 

@@ -104,6 +104,15 @@ test("a frame looks the same however it is reached, and the address names it", a
   await page.close();
 });
 
+test("an address of a missing replay shows the first one", async () => {
+  for (const hash of ["#99@340", "#0+99@340"]) {
+    const { page } = await open(view, hash);
+    await shown(page);
+    assert.equal(await page.locator("select").first().inputValue(), "0");
+    await page.close();
+  }
+});
+
 test("a replay plays, pauses and moves to events by keyboard", async () => {
   const { page } = await open(view);
   await shown(page);

@@ -76,7 +76,11 @@ class Replays {
   /** Shows what the address names. */
   async show(wanted: Shown): Promise<void> {
     const contents = [wanted.replay, wanted.other].filter((k) => k !== undefined).map((k) => this.contents[k]);
-    if (!contents.every((content) => content !== undefined)) return;
+    if (!contents.every((content) => content !== undefined)) {
+      // The address names a replay that the page does not have.
+      if (this.contents.length > 0) await this.show({ replay: 0, frame: 0 });
+      return;
+    }
     const isChosen = this.isChosen(wanted);
     this.shown = wanted;
     if (isChosen) {

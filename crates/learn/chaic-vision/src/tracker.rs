@@ -194,7 +194,7 @@ impl Tracker {
         self.release(now, pose);
         let mut kinds: Vec<PixelKind> =
             measurements.iter().map(|s| pixel_kind(s.label())).collect();
-        let held_boxes = self.held_boxes();
+        let held_boxes = self.held_boxes(Vec3::ZERO);
         for (kind, measurement) in kinds.iter_mut().zip(measurements) {
             if is_within(&held_boxes, measurement.extent.position_in_world, pose) {
                 *kind = PixelKind::Carried;

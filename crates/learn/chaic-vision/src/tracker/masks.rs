@@ -8,9 +8,13 @@ use chaic_core::{ClassId, Hand, Vec2, Vec3};
 use super::plan_extent::PlanExtent;
 use super::{Track, Tracker, pixel_kind};
 
+/// Half extents of an unknown object, meters: the highest object that fits in a hand has 1.06.
+const UNKNOWN_M: Vec3 = Vec3::new(0.25, 0.55, 0.25);
+
 impl Tracker {
     /// Sets a mask where the image shows held objects, regardless of their detected class: shape
-    /// [height / stride, width / stride], rounded up.
+    /// [height / stride, width / stride], rounded up. An object may be larger than the class for which
+    /// it was taken; in the static map it would block the way wherever the agent goes.
     pub fn mask_held(
         &self,
         pose: Pose,
@@ -19,7 +23,7 @@ impl Tracker {
         stride: u32,
         mask: &mut [bool],
     ) {
-        let boxes = self.held_boxes();
+        let boxes = self.held_boxes(UNKNOWN_M);
         if boxes.is_empty() {
             return;
         }
@@ -68,18 +72,18 @@ impl Tracker {
         }
     }
 
-    /// Boxes of held objects in the body's frame: centers and half extents, meters.
-    pub(super) fn held_boxes(&self) -> Vec<(Vec3, Vec3)> {
+    /// Boxes of held objects in the body's frame: centers and half extents, meters. Half extents without
+    /// margin are at least `min_half_m`.
+    pub(super) fn held_boxes(&self, min_half_m: Vec3) -> Vec<(Vec3, Vec3)> {
         /// Margin around the extents of the class, meters.
         const MARGIN_M: f32 = 0.1;
         /// Height of the contents above the center of their container, meters.
         const CONTENTS_M: f32 = 0.4;
-        /// Half extent of an unknown object, meters.
-        const UNKNOWN_M: f32 = 0.25;
         let half = |class: Option<ClassId>| {
-            let size = class.map_or([2.0 * UNKNOWN_M; 3], |class| class.info().size_m);
+            let size = class.map_or((2.0 * UNKNOWN_M).to_array(), |class| class.info().size_m);
             let across = 0.5 * size[0].max(size[2]);
-            Vec3::new(across, 0.5 * size[1], across) + Vec3::splat(MARGIN_M)
+            let half = Vec3::new(across, 0.5 * size[1], across);
+            half.max(min_half_m) + Vec3::splat(MARGIN_M)
         };
         let height_m = self.height_m;
         if self.hands.is_joint {

@@ -271,3 +271,29 @@ fn pixels_within_a_known_obstacle_are_not_static_until_it_is_removed() {
     observer.observe(&[]);
     assert!(!masked(&observer).contains(&true));
 }
+
+#[test]
+fn an_object_held_for_a_smaller_one_is_not_static_and_hides_no_detection() {
+    let mut observer = Observer::new(&[]);
+    let pen = observer.observe(&[measurement("pen", 0.9, [0.0, 0.8, -1.0])])[0].track;
+    observer.hold(Some((pen, "pen")));
+    // A point in front of the left hand, farther from it than a pen reaches.
+    let point = Vec3::new(-0.4, 1.0, -0.7);
+    let camera = Camera {
+        eye_in_world: 1.65 * Vec3::Y,
+        world_from_camera: yaw_rotation(0.0),
+        vertical_fov_rad: Camera::EYE_FOV_RAD,
+        width: SIDE_PX,
+        height: SIDE_PX,
+    };
+    let (px, _) = camera.project(point).expect("in view");
+    let k = px.y as usize * SIDE_PX as usize + px.x as usize;
+    let masked = |depth: f32| {
+        let depth_m = vec![depth; (SIDE_PX * SIDE_PX) as usize];
+        let mut mask = vec![false; depth_m.len()];
+        observer.tracker.mask_held(observer.pose, &depth_m, &camera, 1, &mut mask);
+        mask[k]
+    };
+    assert_eq!([masked(0.7), masked(1.5)], [true, false]);
+    assert_eq!(observer.observe(&[measurement("apple", 0.9, point.into())]).len(), 1);
+}

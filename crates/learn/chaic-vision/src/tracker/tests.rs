@@ -278,7 +278,7 @@ fn an_object_held_for_a_smaller_one_is_not_static_and_hides_no_detection() {
     let pen = observer.observe(&[measurement("pen", 0.9, [0.0, 0.8, -1.0])])[0].track;
     observer.hold(Some((pen, "pen")));
     // A point in front of the left hand, farther from it than a pen reaches.
-    let point = Vec3::new(-0.4, 1.0, -0.7);
+    let point = Vec3::new(-0.5, 1.0, -0.7);
     let camera = Camera {
         eye_in_world: 1.65 * Vec3::Y,
         world_from_camera: yaw_rotation(0.0),

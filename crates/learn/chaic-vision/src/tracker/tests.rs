@@ -35,6 +35,17 @@ fn person(top_m: f32, at: [f32; 3]) -> Measurement {
     measurement
 }
 
+/// Camera of an adult at this pose.
+fn camera(pose: Pose) -> Camera {
+    Camera {
+        eye_in_world: pose.position + 1.65 * Vec3::Y,
+        world_from_camera: yaw_rotation(pose.yaw_rad),
+        vertical_fov_rad: Camera::EYE_FOV_RAD,
+        width: SIDE_PX,
+        height: SIDE_PX,
+    }
+}
+
 struct Observer {
     tracker: Tracker,
     now: Frame,
@@ -52,13 +63,7 @@ impl Observer {
 
     fn observe(&mut self, measurements: &[Measurement]) -> Vec<Detection> {
         self.now += 10;
-        let camera = Camera {
-            eye_in_world: self.pose.position + 1.65 * Vec3::Y,
-            world_from_camera: yaw_rotation(self.pose.yaw_rad),
-            vertical_fov_rad: Camera::EYE_FOV_RAD,
-            width: SIDE_PX,
-            height: SIDE_PX,
-        };
+        let camera = camera(self.pose);
         // Far away, so that nothing is occluded.
         let depth_m = vec![50.0; (SIDE_PX * SIDE_PX) as usize];
         self.tracker.update(measurements, self.now, self.pose, &depth_m, &camera).0
@@ -244,13 +249,7 @@ fn pixels_within_a_known_obstacle_are_not_static_until_it_is_removed() {
     let mut bin = measurement("trashbin", 0.9, [0.0, 0.4, -3.0]);
     bin.extent.footprint = (-1..=1).map(|k| Vec2::new(0.125 * k as f32, -3.0)).collect();
     let found = observer.observe(std::slice::from_ref(&bin));
-    let camera = Camera {
-        eye_in_world: 1.65 * Vec3::Y,
-        world_from_camera: yaw_rotation(0.0),
-        vertical_fov_rad: Camera::EYE_FOV_RAD,
-        width: SIDE_PX,
-        height: SIDE_PX,
-    };
+    let camera = camera(Pose::default());
     // A plane through the obstacle.
     let depth_m = vec![3.0; (SIDE_PX * SIDE_PX) as usize];
     let masked = |observer: &Observer| {
@@ -279,13 +278,7 @@ fn an_object_held_for_a_smaller_one_is_not_static_and_hides_no_detection() {
     observer.hold(Some((pen, "pen")));
     // A point in front of the left hand, farther from it than a pen reaches.
     let point = Vec3::new(-0.5, 1.0, -0.7);
-    let camera = Camera {
-        eye_in_world: 1.65 * Vec3::Y,
-        world_from_camera: yaw_rotation(0.0),
-        vertical_fov_rad: Camera::EYE_FOV_RAD,
-        width: SIDE_PX,
-        height: SIDE_PX,
-    };
+    let camera = camera(Pose::default());
     let (px, _) = camera.project(point).expect("in view");
     let k = px.y as usize * SIDE_PX as usize + px.x as usize;
     let masked = |depth: f32| {

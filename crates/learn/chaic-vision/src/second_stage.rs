@@ -23,6 +23,7 @@ const MIN_REMAINING: f32 = 0.4;
 /// and 0.82 without this rule, 0.85, 0.93 and 0.91 with it; fractions of 0.25 and 0.8 give the same
 /// within 0.03.
 const MAX_NESTED_FRACTION: f32 = 0.5;
+/// See [`MAX_NESTED_FRACTION`].
 const MIN_NESTED_SCORE: f32 = 0.2;
 /// Instances with a lower score are dropped.
 const MIN_SCORE: f32 = 0.02;
@@ -216,54 +217,41 @@ pub(crate) fn redrawn_pixels(mask: &[f32], roi: RoiBox, pixels: &Pixels) -> Vec<
 /// pixels, unless the other is a small object in front of it, such as a plate on a table: redrawn
 /// masks of furniture also cover the objects on it.
 fn suppress(candidates: Vec<Candidate>, n_pixels: usize) -> Vec<Candidate> {
-    let mut kept: Vec<KeptCandidate> = Vec::new();
+    let mut kept: Vec<Candidate> = Vec::new();
     let mut owners = vec![u16::MAX; n_pixels];
     for candidate in candidates {
-        debug_assert_ne!(candidate.segment.label, BACKGROUND);
-        let n = candidate.segment.pixels.len();
+        let Segment { label, score, ref pixels, .. } = candidate.segment;
+        debug_assert_ne!(label, BACKGROUND);
         let is_same = kept.iter().any(|other| {
-            let shared = n_shared(&candidate.segment.pixels, &other.candidate.segment.pixels);
-            let union = n + other.candidate.segment.pixels.len() - shared;
+            let shared = n_shared(pixels, &other.segment.pixels);
+            let union = pixels.len() + other.segment.pixels.len() - shared;
             shared as f32 > SUPPRESSION_IOU * union as f32
         });
         if is_same {
             continue;
         }
         let is_free = |k: &u32| {
-            let owner = kept.get(usize::from(owners[*k as usize]));
-            owner.is_none_or(|owner| {
-                let Segment { label, ref pixels, .. } = owner.candidate.segment;
-                label != candidate.segment.label
-                    && candidate.segment.score >= MIN_NESTED_SCORE
-                    && n as f32 <= MAX_NESTED_FRACTION * pixels.len() as f32
+            kept.get(usize::from(owners[*k as usize])).is_none_or(|owner| {
+                let max_nested = MAX_NESTED_FRACTION * owner.segment.pixels.len() as f32;
+                label != owner.segment.label
+                    && score >= MIN_NESTED_SCORE
+                    && pixels.len() as f32 <= max_nested
             })
         };
-        let own: Vec<u32> = candidate.segment.pixels.iter().copied().filter(is_free).collect();
-        if (own.len() as f32) < MIN_REMAINING * n as f32 {
+        let own: Vec<u32> = pixels.iter().copied().filter(is_free).collect();
+        if (own.len() as f32) < MIN_REMAINING * pixels.len() as f32 {
             continue;
         }
-        for k in &own {
-            let owner = std::mem::replace(&mut owners[*k as usize], kept.len() as u16);
-            if let Some(owner) = kept.get_mut(usize::from(owner)) {
-                owner.n_own -= 1;
-            }
-        }
-        kept.push(KeptCandidate { n_own: own.len(), candidate });
+        own.into_iter().for_each(|k| owners[k as usize] = kept.len() as u16);
+        kept.push(candidate);
     }
-    let with_own_pixels = kept.into_iter().enumerate().filter_map(|(number, kept)| {
-        let KeptCandidate { mut candidate, n_own } = kept;
-        let is_large_enough = n_own as f32 >= MIN_REMAINING * candidate.segment.pixels.len() as f32;
-        candidate.segment.pixels.retain(|k| usize::from(owners[*k as usize]) == number);
-        is_large_enough.then_some(candidate)
+    let with_own_pixels = kept.into_iter().enumerate().filter_map(|(number, mut candidate)| {
+        let pixels = &mut candidate.segment.pixels;
+        let n = pixels.len();
+        pixels.retain(|k| usize::from(owners[*k as usize]) == number);
+        (pixels.len() as f32 >= MIN_REMAINING * n as f32).then_some(candidate)
     });
     with_own_pixels.collect()
-}
-
-/// Candidate with its whole mask.
-struct KeptCandidate {
-    candidate: Candidate,
-    /// Number of pixels of the mask that it owns.
-    n_own: usize,
 }
 
 /// Number of common elements of two ascending lists.

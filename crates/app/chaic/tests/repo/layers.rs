@@ -4,11 +4,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use serde_json::{Value, json};
 
-use crate::{root, sources};
+use crate::{cargo_metadata, root, sources};
 
 /// The folders of `crates/` in order. A crate depends on its own layer and on earlier ones.
 const LAYERS: [&str; 7] = ["core", "sim", "render", "agents", "learn", "eval", "app"];
@@ -85,9 +84,7 @@ fn architecture() -> BTreeMap<String, Row> {
 }
 
 fn metadata() -> Value {
-    let arguments = ["metadata", "--no-deps", "--offline", "--format-version", "1"];
-    let out = Command::new(env!("CARGO")).args(arguments).current_dir(root()).output();
-    serde_json::from_slice(&out.expect("cargo runs").stdout).expect("JSON")
+    cargo_metadata(&["--no-deps"])
 }
 
 fn list(value: &Value) -> &[Value] {

@@ -5,7 +5,7 @@ use std::process::Command;
 use serde_json::Value;
 use spdx::{Expression, ParseMode};
 
-use crate::root;
+use crate::{cargo_metadata, root};
 
 /// Source of the packages on crates.io in `cargo metadata`.
 const REGISTRY: &str = "registry+https://github.com/rust-lang/crates.io-index";
@@ -47,14 +47,7 @@ fn metadata() -> Value {
     let rustc = Command::new("rustc").arg("-vV").output().expect("rustc starts");
     let version = String::from_utf8(rustc.stdout).expect("rustc writes UTF-8");
     let host = version.lines().find_map(|line| line.strip_prefix("host: ")).expect("a host");
-    let output = Command::new(env!("CARGO"))
-        .args(["metadata", "--format-version", "1", "--locked", "--offline"])
-        .args(["--filter-platform", host])
-        .current_dir(root())
-        .output()
-        .expect("cargo starts");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    serde_json::from_slice(&output.stdout).expect("cargo writes JSON")
+    cargo_metadata(&["--locked", "--filter-platform", host])
 }
 
 /// Returns a line for each package whose license or source is not allowed. Members of the workspace have no source.

@@ -1,4 +1,4 @@
-//! Checks of the repository itself: dependencies, imports, prose, citations, links and published tables.
+//! Checks of the repository itself: dependencies, licenses, imports, prose, citations, links and published tables.
 
 mod citations;
 mod cycles;
@@ -9,10 +9,25 @@ mod prose;
 mod readme;
 
 use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::Value;
 
 /// Returns the root of the repository.
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).expect("the root")
+}
+
+/// Returns what `cargo metadata` tells without the network.
+fn cargo_metadata(arguments: &[&str]) -> Value {
+    let output = Command::new(env!("CARGO"))
+        .args(["metadata", "--format-version", "1", "--offline"])
+        .args(arguments)
+        .current_dir(root())
+        .output()
+        .expect("cargo starts");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).expect("cargo writes JSON")
 }
 
 /// Adds all source files below a folder to `found`, without files of tests.

@@ -8,7 +8,7 @@ use chaic_core::{ClassId, Hand, Vec2, Vec3};
 use super::plan_extent::PlanExtent;
 use super::{Track, Tracker, pixel_kind};
 
-/// Half extents of an unknown object, meters: the highest object that fits in a hand has 1.06.
+/// Half extents of an unknown object, meters. A fire extinguisher, 1.06 m high, was taken for a pen.
 const UNKNOWN_M: Vec3 = Vec3::new(0.25, 0.55, 0.25);
 
 impl Tracker {

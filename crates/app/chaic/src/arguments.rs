@@ -22,8 +22,8 @@ use chaic_core::{AgentId, TaskId};
 use clap::{Args, ColorChoice, Parser, Subcommand, ValueEnum};
 
 pub use self::bench::{
-    BenchCommand, EnvBenchArguments, GpuAdapter, RenderBenchArguments, SceneBenchArguments,
-    SceneChoice, SceneCommand, SceneName, WorldBenchArguments,
+    BenchCommand, EnvBenchArguments, EnvChoice, GpuAdapter, RenderBenchArguments, ScalingArguments,
+    SceneBenchArguments, SceneChoice, SceneCommand, SceneName, WorldBenchArguments,
 };
 pub use self::episodes::{EpisodesCommand, ImportCommand, ImportHalf, OriginalArguments};
 pub use self::eval::{EvalArguments, EvalCommand, LanguageArguments, ModelEvaluation};

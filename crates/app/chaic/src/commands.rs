@@ -30,6 +30,7 @@ mod bars;
 mod datasets;
 mod recorded;
 mod run_perception;
+mod sealed;
 mod summary;
 
 use std::path::Path;

@@ -14,12 +14,12 @@ use serde::Serialize;
 use super::{Machine, Stopwatch};
 use chaic_eval::{EvalError, Result};
 
-/// Configuration of an environment benchmark.
+/// Environments of a benchmark: rule-based partners in training episodes.
 #[derive(Clone, Debug)]
-pub struct EnvBench {
+pub struct EnvSetup {
     /// Tasks, used in turn.
     pub tasks: Vec<TaskId>,
-    /// Number of environments that are stepped together.
+    /// Number of environments.
     pub envs: usize,
     /// Side of the helpers' images, pixels.
     pub size: u32,
@@ -27,6 +27,13 @@ pub struct EnvBench {
     pub partner_size: u32,
     /// Channels of the helpers' images.
     pub channels: Channels,
+}
+
+/// Configuration of an environment benchmark.
+#[derive(Clone, Debug)]
+pub struct EnvBench {
+    /// Environments that are stepped together.
+    pub setup: EnvSetup,
     /// Number of threads.
     pub threads: usize,
     /// Minimum duration, seconds.
@@ -70,34 +77,14 @@ impl EnvBench {
     /// # Errors
     /// If episodes cannot be read or threads cannot be started.
     pub fn measure(&self, progress: &mut dyn FnMut(f32)) -> Result<EnvSpeed> {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build();
-        let pool =
-            pool.map_err(|problem| EvalError::Options(format!("cannot start threads: {problem}")))?;
-        // Progress bars cannot be shared between threads.
-        let (sender, receiver) = std::sync::mpsc::channel();
-        std::thread::scope(|scope| {
-            let work = scope.spawn(move || {
-                pool.install(|| {
-                    self.play(&mut |fraction| {
-                        let _ = sender.send(fraction);
-                    })
-                })
-            });
-            receiver.iter().for_each(progress);
-            work.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-        })
+        super::with_threads(self.threads, progress, |progress| self.play(progress))
     }
 
     fn play(&self, progress: &mut dyn FnMut(f32)) -> Result<EnvSpeed> {
-        let bundled = self.episodes()?;
-        let Channels { rgb, depth, ids } = self.channels;
-        let sensors = SensorConfig { image_size: self.size, rgb, depth, ids, frame_history: None };
-        let env = |k: usize| {
-            let helper = Some(AgentSlot::external(Grants::IDS, sensors));
-            Env::new(self.config(&bundled, k), EpisodeAgents { helper, partner: None })
-        };
-        let envs: std::result::Result<Vec<Env>, _> = (0..self.envs).map(env).collect();
-        let mut batch = EnvBatch::new(envs?)?;
+        let EnvSetup { envs, size, partner_size, channels, .. } = self.setup;
+        let bundled = self.setup.episodes()?;
+        let all: Result<Vec<Env>> = (0..envs).map(|k| self.setup.env(&bundled, k)).collect();
+        let mut batch = EnvBatch::new(all?)?;
         let [n_rgb, n_depth, n_ids] = batch.layout().lengths();
         let (mut rgb, mut depth_m, mut ids) = (vec![0; n_rgb], vec![0.0; n_depth], vec![0; n_ids]);
         let mut rng = RngStream::new(0, "bench env", 0);
@@ -112,7 +99,7 @@ impl EnvBench {
                     Ok(AdvanceOutcome::NeedsAction) => {}
                     Ok(AdvanceOutcome::Ended | AdvanceOutcome::Stopped) => {
                         n_ended += 1;
-                        batch.reset(k, self.config(&bundled, self.envs + n_ended))?;
+                        batch.reset(k, self.setup.config(&bundled, envs + n_ended))?;
                     }
                     Err(error) => return Err(EvalError::Options(error.to_string())),
                 }
@@ -123,7 +110,7 @@ impl EnvBench {
                 ids: (n_ids > 0).then_some(&mut ids),
             };
             for slot in batch.observe(buffers)? {
-                batch.submit(slot, random_action(self.size, &mut rng));
+                batch.submit(slot, random_action(size, &mut rng));
                 steps += 1;
             }
             fraction = clock.elapsed().as_secs_f32() / self.seconds;
@@ -131,10 +118,10 @@ impl EnvBench {
         }
         let seconds = clock.elapsed().as_secs_f64();
         Ok(EnvSpeed {
-            envs: self.envs,
-            size: self.size,
-            partner_size: self.partner_size,
-            channels: super::render::channel_names(self.channels),
+            envs,
+            size,
+            partner_size,
+            channels: super::render::channel_names(channels),
             threads: self.threads,
             steps,
             frames,
@@ -145,22 +132,33 @@ impl EnvBench {
             machine: Machine::current(),
         })
     }
+}
 
-    fn episodes(&self) -> Result<Vec<Episode>> {
+impl EnvSetup {
+    /// Returns the training episodes of the tasks, with the tasks in turn.
+    pub(super) fn episodes(&self) -> Result<Vec<Episode>> {
         let mut all = Vec::new();
         for task in &self.tasks {
             for episode in episodes(&Split::Train, *task) {
                 all.push(episode?);
             }
         }
-        // Order the episodes by tasks in turn.
         let n_per_task = (all.len() / self.tasks.len().max(1)).max(1);
         let mut order: Vec<usize> = (0..all.len()).collect();
         order.sort_by_key(|k| (k % n_per_task, k / n_per_task));
         Ok(order.into_iter().map(|k| all[k].clone()).collect())
     }
 
-    fn config<'a>(&self, bundled: &'a [Episode], number: usize) -> EpisodeConfig<'a> {
+    /// Creates an environment whose helper is an external agent.
+    pub(super) fn env(&self, bundled: &[Episode], number: usize) -> Result<Env> {
+        let Channels { rgb, depth, ids } = self.channels;
+        let sensors = SensorConfig { image_size: self.size, rgb, depth, ids, frame_history: None };
+        let helper = Some(AgentSlot::external(Grants::IDS, sensors));
+        Ok(Env::new(self.config(bundled, number), EpisodeAgents { helper, partner: None })?)
+    }
+
+    /// Returns the configuration of an episode; episodes repeat with other seeds.
+    pub(super) fn config<'a>(&self, bundled: &'a [Episode], number: usize) -> EpisodeConfig<'a> {
         EpisodeConfig {
             seed: (number / bundled.len()) as u32,
             image_size: Some(self.partner_size),
@@ -174,7 +172,7 @@ fn n_frames(batch: &EnvBatch) -> u64 {
 }
 
 /// Draws from the same distribution as the world benchmark, with pixels as targets.
-fn random_action(size: u32, rng: &mut RngStream) -> Action {
+pub(super) fn random_action(size: u32, rng: &mut RngStream) -> Action {
     let hand = if rng.chance(0.5) { Hand::Left } else { Hand::Right };
     let mut pixel = || rng.below(size as usize) as u32;
     let target = Target::Pixel { column: pixel(), row: pixel() };
@@ -194,15 +192,14 @@ mod tests {
 
     #[test]
     fn environments_of_all_tasks_are_stepped_together() {
-        let bench = EnvBench {
+        let setup = EnvSetup {
             tasks: TaskId::paper().collect(),
             envs: 8,
             size: 32,
             partner_size: 32,
             channels: Channels::ALL,
-            threads: 2,
-            seconds: 0.5,
         };
+        let bench = EnvBench { setup, threads: 2, seconds: 0.5 };
         let mut fractions = Vec::new();
         let speed =
             bench.measure(&mut |fraction| fractions.push(fraction)).expect("bundled episodes");

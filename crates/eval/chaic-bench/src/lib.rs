@@ -3,16 +3,21 @@
 mod env;
 mod gpu;
 mod machine;
+mod queueing;
 mod render;
+mod scaling;
 mod scene;
 mod world;
 
 use std::time::{Duration, Instant};
 
-pub use env::{EnvBench, EnvSpeed};
+use chaic_eval::{EvalError, Result};
+
+pub use env::{EnvBench, EnvSetup, EnvSpeed};
 pub use gpu::{GpuBench, GpuSpeed};
 pub use machine::Machine;
 pub use render::{RenderBench, RenderSpeed, parse_channels, parse_channels_or_none};
+pub use scaling::{Cluster, ClusterSpeed, CoreSpeed, ScalingBench, ScalingEstimate};
 pub use scene::{BenchScene, N_VIEWS};
 pub use world::{WorldSpeed, measure_world};
 
@@ -46,6 +51,30 @@ fn cpu_time() -> Option<Duration> {
 #[cfg(not(unix))]
 fn cpu_time() -> Option<Duration> {
     None
+}
+
+/// Runs `work` on a pool of its own. Its progress reaches the calling thread, since progress bars cannot be
+/// shared between threads.
+fn with_threads<T: Send>(
+    threads: usize,
+    progress: &mut dyn FnMut(f32),
+    work: impl FnOnce(&mut dyn FnMut(f32)) -> Result<T> + Send,
+) -> Result<T> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool =
+        pool.map_err(|problem| EvalError::Options(format!("cannot start threads: {problem}")))?;
+    let (sender, receiver) = std::sync::mpsc::channel();
+    std::thread::scope(|scope| {
+        let work = scope.spawn(move || {
+            pool.install(|| {
+                work(&mut |fraction| {
+                    let _ = sender.send(fraction);
+                })
+            })
+        });
+        receiver.iter().for_each(progress);
+        work.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    })
 }
 
 /// Returns the mean duration of `n` items, milliseconds.

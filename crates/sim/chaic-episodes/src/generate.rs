@@ -5,7 +5,7 @@ use chaic_core::task::SceneKind;
 use chaic_world::Setup;
 
 use crate::attempts::GenerateError;
-use crate::format::GeneratorInfo;
+use crate::format::{Episode, GeneratorInfo};
 use crate::seeds::GeneratorSeeds;
 use crate::{Settings, house, street, yard};
 
@@ -31,6 +31,21 @@ pub fn generate_with(
         SceneKind::Street => street::generate(task, seeds, settings),
         SceneKind::Yard => yard::generate(task, seeds, settings),
     }
+}
+
+/// Generates an episode with this name, of a split with this name.
+///
+/// # Errors
+/// [`GenerateError`] if no attempt led to a valid setup.
+pub fn generate_episode(
+    id: String,
+    split: String,
+    task: TaskId,
+    seeds: GeneratorSeeds,
+    settings: Settings,
+) -> Result<Episode, GenerateError> {
+    let setup = generate_with(task, seeds, settings)?;
+    Ok(Episode::trusted(id, split, generator_info(task, seeds, settings), setup))
 }
 
 /// Returns the name and version of the task's generator, with its inputs.

@@ -40,7 +40,7 @@ mod upright_box;
 pub use attempts::GenerateError;
 pub use bundled::{Bundled, regenerate_bundled};
 pub use format::{Episode, EpisodeError, GeneratorInfo, MAX_EPISODE_BYTES, json_schema};
-pub use generate::{generate, generate_with};
+pub use generate::{generate, generate_episode, generate_with};
 pub use lookup::{episodes, find_episode};
 pub use seeds::{
     BUNDLED_PER_TASK, DatasetSplit, GeneratorSeeds, SEED_RANGES, STANDARD_PER_TASK, SeedPurpose,

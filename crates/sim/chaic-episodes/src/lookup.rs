@@ -5,7 +5,7 @@ use chaic_core::TaskId;
 use crate::Settings;
 use crate::bundled::{bundled_test, bundled_train};
 use crate::format::Episode;
-use crate::generate::{generate_with, generator_info};
+use crate::generate::generate_episode;
 use crate::seeds::{FIRST_BUNDLED_SEED, GeneratorSeeds};
 use crate::split::{Split, SplitError};
 use crate::standard::standard;
@@ -59,9 +59,7 @@ pub fn find_episode(id: &str) -> Result<Episode, SplitError> {
 
 fn generated(task: TaskId, seed: u64, settings: Settings) -> Result<Episode, SplitError> {
     let seeds = GeneratorSeeds::from_seed(seed);
-    let setup = generate_with(task, seeds, settings)?;
     let word = if settings == Settings::STANDARD { "gen-standard" } else { "gen" };
     let id = format!("{task}/{word}/{seed}");
-    let generator = generator_info(task, seeds, settings);
-    Ok(Episode::trusted(id, "generated".to_owned(), generator, setup))
+    Ok(generate_episode(id, "generated".to_owned(), task, seeds, settings)?)
 }

@@ -106,6 +106,15 @@ impl SeedRange {
     pub const STANDARD: SeedRange =
         benchmark(DatasetSplit::Test, 3 * FIRST_BUNDLED_SEED, STANDARD_PER_TASK);
 
+    /// Episodes of sealed splits, whose seeds follow from a secret. The largest is below 2^53, so that
+    /// JSON readers with 64-bit floats read it exactly.
+    pub const SEALED: SeedRange = SeedRange {
+        purpose: SeedPurpose::Benchmark,
+        split: DatasetSplit::Test,
+        first: 1 << 52,
+        count: 1 << 52,
+    };
+
     /// Training episodes of policies.
     pub const POLICY_TRAIN: SeedRange = SeedRange {
         purpose: SeedPurpose::Policy,
@@ -158,10 +167,11 @@ const fn benchmark(split: DatasetSplit, first: u64, n_per_task: usize) -> SeedRa
 }
 
 /// All reserved ranges, pairwise disjoint.
-pub const SEED_RANGES: [SeedRange; 11] = [
+pub const SEED_RANGES: [SeedRange; 12] = [
     SeedRange::BUNDLED_TRAIN,
     SeedRange::BUNDLED_TEST,
     SeedRange::STANDARD,
+    SeedRange::SEALED,
     SeedRange::perception(DatasetSplit::Train),
     SeedRange::perception(DatasetSplit::Validation),
     SeedRange::perception(DatasetSplit::Test),

@@ -11,7 +11,7 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use crate::attempts::GenerateError;
 use crate::format::Episode;
-use crate::generate::{generate_with, generator_info};
+use crate::generate::generate_episode;
 use crate::seeds::{STANDARD_PER_TASK, task_index};
 use crate::split::{Split, SplitError};
 
@@ -59,10 +59,8 @@ fn table_line(episode: &Episode) -> String {
 fn regenerate(task: TaskId, k: u64) -> Result<Episode, GenerateError> {
     let split = Split::Standard;
     let (seeds, settings) = (split.seeds(task, k), split.settings());
-    let setup = generate_with(task, seeds, settings)?;
     let id = split.episode_id(task, k as usize);
-    let generator = generator_info(task, seeds, settings);
-    Ok(Episode::trusted(id, split.to_string(), generator, setup))
+    generate_episode(id, split.to_string(), task, seeds, settings)
 }
 
 #[cfg(test)]

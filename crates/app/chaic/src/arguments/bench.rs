@@ -53,6 +53,8 @@ pub enum BenchCommand {
     World(WorldBenchArguments),
     /// Measure batched environments: simulation, rule-based partners and images of random helpers.
     Env(EnvBenchArguments),
+    /// Estimate the speed of environments on more cores and machines from times measured on one core.
+    Scaling(ScalingArguments),
     /// Write the scene of `chaic bench render` for other renderers: scene.glb, cameras.json, chaic.png.
     Scene(SceneBenchArguments),
 }
@@ -126,9 +128,9 @@ pub struct WorldBenchArguments {
     pub duration: DurationArguments,
 }
 
-/// `chaic bench env`.
+/// Environments of a measurement.
 #[derive(Args, Debug)]
-pub struct EnvBenchArguments {
+pub struct EnvChoice {
     /// Tasks, separated by commas, or `all`; their bundled training episodes take turns.
     #[arg(long, alias = "tasks", value_name = "NAMES", value_parser = tasks, default_value = "all")]
     pub task: Tasks,
@@ -146,9 +148,34 @@ pub struct EnvBenchArguments {
     /// Channels of the helpers' images: rgb, depth and ids, joined by +; or none.
     #[arg(long, value_name = "NAMES", default_value = "rgb+depth", value_parser = parse_channels_or_none)]
     pub channels: Channels,
+}
+
+/// `chaic bench env`.
+#[derive(Args, Debug)]
+pub struct EnvBenchArguments {
+    #[command(flatten)]
+    pub envs: EnvChoice,
     /// Threads, 1 to 1024.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: u16,
+    #[command(flatten)]
+    pub duration: DurationArguments,
+}
+
+/// `chaic bench scaling`.
+#[derive(Args, Debug)]
+pub struct ScalingArguments {
+    #[command(flatten)]
+    pub envs: EnvChoice,
+    /// Cores of each machine of the cluster, 1 to 1024.
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub cores_per_node: u16,
+    /// Rate of the learner's network connection, 1 to 1000000 Mbit/s.
+    #[arg(long, value_name = "MBIT", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub network: u32,
+    /// Decisions that the learner processes per second, 1 to 10000000.
+    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    pub learner_rate: u32,
     #[command(flatten)]
     pub duration: DurationArguments,
 }

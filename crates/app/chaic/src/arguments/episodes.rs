@@ -61,6 +61,33 @@ pub enum EpisodesCommand {
         #[arg(long)]
         split: Option<Split>,
     },
+    /// Make a sealed split: episodes that follow from a secret, and a public commitment to them.
+    Seal {
+        /// File of the secret; it is made if it does not exist. Keep it to yourself until the split is opened.
+        #[arg(long, value_name = "FILE")]
+        secret: PathBuf,
+        /// Tasks, separated by commas, or `all`.
+        #[arg(long, alias = "tasks", value_name = "NAMES", value_parser = tasks, default_value = "all")]
+        task: Tasks,
+        /// Episodes of each task, 1 to 10000.
+        #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u16).range(1..=10_000))]
+        n_episodes: u16,
+        /// Folder for commitment.json, which you publish, and the folder `episodes`, which you do not.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+    },
+    /// Open a sealed split: check the secret against the commitment and write the episodes.
+    Open {
+        /// The published secret.
+        #[arg(long, value_name = "FILE")]
+        secret: PathBuf,
+        /// The published commitment.json.
+        #[arg(long, value_name = "FILE")]
+        commitment: PathBuf,
+        /// Folder for the episode files.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+    },
     /// Print the JSON schema of an episode file.
     Schema,
 }

@@ -2,8 +2,8 @@
 
 use anyhow::Result;
 use chaic_bench::{
-    BenchScene, EnvBench, EnvSpeed, GpuBench, GpuSpeed, Machine, N_VIEWS, RenderBench, RenderSpeed,
-    WorldSpeed, measure_world,
+    BenchScene, Cluster, EnvBench, EnvSetup, EnvSpeed, GpuBench, GpuSpeed, Machine, N_VIEWS,
+    RenderBench, RenderSpeed, ScalingBench, ScalingEstimate, WorldSpeed, measure_world,
 };
 use chaic_eval::EvalError;
 use chaic_gltf::SceneSummary;
@@ -11,8 +11,8 @@ use serde_json::json;
 
 use super::{bars, table};
 use crate::arguments::{
-    BenchCommand, EnvBenchArguments, GpuAdapter, RenderBenchArguments, SceneBenchArguments,
-    SceneChoice, SceneName, WorldBenchArguments,
+    BenchCommand, EnvBenchArguments, EnvChoice, GpuAdapter, RenderBenchArguments, ScalingArguments,
+    SceneBenchArguments, SceneChoice, SceneName, WorldBenchArguments,
 };
 use crate::exit::ExitStatus;
 use crate::output::{OutputFormat, counted, print_result, print_warning};
@@ -23,6 +23,7 @@ pub fn run(command: &BenchCommand, format: OutputFormat) -> Result<ExitStatus> {
         BenchCommand::Render(arguments) => render(arguments, format),
         BenchCommand::World(arguments) => world(arguments, format),
         BenchCommand::Env(arguments) => env(arguments, format),
+        BenchCommand::Scaling(arguments) => scaling(arguments, format),
         BenchCommand::Scene(arguments) => scene(arguments, format),
     }?;
     Ok(ExitStatus::Success)
@@ -141,7 +142,7 @@ fn world_text(speeds: &[WorldSpeed]) -> String {
 const MAX_PIXELS: u64 = 1 << 28;
 
 /// Refuses images that do not fit into memory.
-fn check_images(arguments: &EnvBenchArguments) -> Result<(), EvalError> {
+fn check_images(arguments: &EnvChoice) -> Result<(), EvalError> {
     let [helper, partner] =
         [arguments.size, arguments.partner_size].map(|side| u64::from(side).pow(2));
     let px = u64::from(arguments.envs) * (helper + partner);
@@ -153,15 +154,22 @@ fn check_images(arguments: &EnvBenchArguments) -> Result<(), EvalError> {
     )))
 }
 
+fn env_setup(choice: &EnvChoice) -> Result<EnvSetup> {
+    check_images(choice)?;
+    Ok(EnvSetup {
+        tasks: choice.task.0.clone(),
+        envs: usize::from(choice.envs),
+        size: choice.size,
+        partner_size: choice.partner_size,
+        channels: choice.channels,
+    })
+}
+
 fn env(arguments: &EnvBenchArguments, format: OutputFormat) -> Result<()> {
-    check_images(arguments)?;
+    let setup = env_setup(&arguments.envs)?;
     warn_of_slow_build();
     let bench = EnvBench {
-        tasks: arguments.task.0.clone(),
-        envs: usize::from(arguments.envs),
-        size: arguments.size,
-        partner_size: arguments.partner_size,
-        channels: arguments.channels,
+        setup,
         threads: usize::from(arguments.threads),
         seconds: arguments.duration.seconds,
     };
@@ -177,6 +185,53 @@ fn env_text(speed: &EnvSpeed) -> String {
         "{envs} environments, {channels}, {size} x {size}, partners {partner_size} x {partner_size}, \
          {threads}: {steps:.0} helper steps a second, {frames:.0} frames a second; {episodes} episodes ended\n{}",
         machine_text(&speed.machine)
+    )
+}
+
+fn scaling(arguments: &ScalingArguments, format: OutputFormat) -> Result<()> {
+    let setup = env_setup(&arguments.envs)?;
+    warn_of_slow_build();
+    let cluster = Cluster {
+        cores_per_node: usize::from(arguments.cores_per_node),
+        network_mbit_s: f64::from(arguments.network),
+        learner_rate: f64::from(arguments.learner_rate),
+    };
+    let bench = ScalingBench { setup, seconds: arguments.duration.seconds, cluster };
+    let estimate = with_bar(|progress| bench.measure(progress))?;
+    print_result(format, &estimate, &scaling_text(&estimate))
+}
+
+fn scaling_text(estimate: &ScalingEstimate) -> String {
+    let ScalingEstimate { envs, steps, mean_ms, p99_ms, max_ms, image_bytes, cluster, .. } =
+        estimate;
+    let whole = |rate: f64| format!("{rate:.0}");
+    let percent = |fraction: f64| format!("{:.0} %", 100.0 * fraction);
+    let large = format!("Batch of {}", 16 * envs);
+    let mut cores = table(["Cores", &format!("Batch of {envs}"), &large, "Independent"]);
+    for speed in &estimate.cores {
+        let rates = [speed.batch, speed.large_batch, speed.independent].map(whole);
+        cores.add_row(std::iter::once(speed.cores.to_string()).chain(rates));
+    }
+    let mut nodes = table(["Machines", "Decisions/s", "Network busy", "Learner busy"]);
+    for speed in &estimate.nodes {
+        nodes.add_row([
+            speed.nodes.to_string(),
+            whole(speed.steps_per_second),
+            percent(speed.network_utilization),
+            percent(speed.learner_utilization),
+        ]);
+    }
+    format!(
+        "Measured on one core: {steps} decisions, {mean_ms:.2} ms each (99th percentile {p99_ms:.1} ms, \
+         maximum {max_ms:.1} ms), {image_bytes} bytes of images each\n\n\
+         Estimate for one machine, decisions a second:\n{}\n\n\
+         Estimate for machines of {}, a learner of {:.0} decisions a second behind {:.0} Mbit/s:\n{}\n{}",
+        cores.trim_fmt(),
+        counted(cluster.cores_per_node, "core"),
+        cluster.learner_rate,
+        cluster.network_mbit_s,
+        nodes.trim_fmt(),
+        machine_text(&estimate.machine)
     )
 }
 

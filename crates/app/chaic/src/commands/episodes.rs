@@ -12,7 +12,7 @@ use chaic_files::write_atomically;
 use comfy_table::Table;
 use serde_json::json;
 
-use super::{bars, table};
+use super::{bars, sealed, table};
 use crate::arguments::EpisodesCommand;
 use crate::exit::ExitStatus;
 use crate::interrupt;
@@ -30,6 +30,12 @@ pub fn run(command: &EpisodesCommand, format: OutputFormat) -> Result<ExitStatus
         }
         EpisodesCommand::Validate { split: Some(split), .. } => validate_split(split, format),
         EpisodesCommand::Validate { files, .. } => validate(files, format),
+        EpisodesCommand::Seal { secret, task, n_episodes, out } => {
+            sealed::seal(secret, &task.0, usize::from(*n_episodes), out, format)
+        }
+        EpisodesCommand::Open { secret, commitment, out } => {
+            sealed::open(secret, commitment, out, format)
+        }
         EpisodesCommand::Schema => {
             print(&(serde_json::to_string_pretty(&json_schema())? + "\n"))?;
             Ok(ExitStatus::Success)

@@ -59,3 +59,34 @@ fn another_partner_plays_the_same_episodes() {
     let refused = run_err(at, &["eval", "--task", "tires", "--out", "none"]);
     assert!(refused.contains("give --split gen:"), "{refused}");
 }
+
+#[test]
+fn a_sealed_split_is_played_and_opened_by_its_secret_alone() {
+    let dir = tempfile::tempdir().expect("the disk has space");
+    let at = dir.path();
+    let seal = ["episodes", "seal", "--secret", "secret", "--task", "obstacle,shopping"];
+    run_ok(at, &[&seal[..], &["--n-episodes", "1", "--out", "sealed"]].concat());
+    let play = ["eval", "--helper", "none", "--size", "32", "--out", "run"];
+    run_ok(at, &[&play[..], &["--episodes", "sealed/episodes"]].concat());
+    assert!(run_ok(at, &["verify", "run"]).contains("all digests agree"));
+
+    // The commitment has neither the secret nor a seed.
+    let commitment = fs::read_to_string(at.join("sealed/commitment.json")).expect("a text file");
+    let secret = fs::read_to_string(at.join("secret")).expect("a text file");
+    let episode = fs::read(at.join("sealed/episodes/obstacle-000.json")).expect("an episode");
+    let json: serde_json::Value = serde_json::from_slice(&episode).expect("it is JSON");
+    assert!(!commitment.contains(secret.trim()));
+    assert!(!commitment.contains(&json["generator"]["seed"].to_string()));
+
+    let open = ["episodes", "open", "--commitment", "sealed/commitment.json", "--out", "opened"];
+    run_ok(at, &[&open[..], &["--secret", "secret"]].concat());
+    assert!(fs::read(at.join("opened/obstacle-000.json")).expect("an episode") == episode);
+
+    fs::write(at.join("other"), "0".repeat(64)).expect("the disk has space");
+    let refused = run_err(at, &[&open[..], &["--secret", "other"]].concat());
+    assert!(refused.contains("the secret is not that of the commitment"), "{refused}");
+    let forged = commitment.replace("\"episodes_sha256\": \"", "\"episodes_sha256\": \"0");
+    fs::write(at.join("sealed/commitment.json"), forged).expect("the disk has space");
+    let refused = run_err(at, &[&open[..], &["--secret", "secret"]].concat());
+    assert!(refused.contains("the episodes differ from those of the commitment"), "{refused}");
+}

@@ -61,6 +61,17 @@ pub(super) const EXAMPLES: &[CommandExamples] = &[
         ],
     ),
     (
+        "chaic bench scaling",
+        [
+            ("Measure 64 environments", "chaic bench scaling"),
+            (
+                "Estimate a cluster of larger machines",
+                "chaic bench scaling --cores-per-node 64 --network 100000 --learner-rate 50000",
+            ),
+            ("Measure without images of helpers", "chaic bench scaling --channels none"),
+        ],
+    ),
+    (
         "chaic bench scene",
         [
             ("Write the default scene", "chaic bench scene --out scene"),

@@ -151,6 +151,34 @@ pub(super) const EXAMPLES: &[CommandExamples] = &[
         ],
     ),
     (
+        "chaic episodes seal",
+        [
+            (
+                "Seal 100 episodes of each task",
+                "chaic episodes seal --secret secret.txt --out sealed",
+            ),
+            (
+                "Seal ten episodes of one task",
+                "chaic episodes seal --secret secret.txt --task obstacle --n-episodes 10 --out sealed",
+            ),
+            (
+                "Play them",
+                "chaic eval --episodes sealed/episodes --helper none,rhp --out runs/sealed",
+            ),
+        ],
+    ),
+    (
+        "chaic episodes open",
+        [
+            (
+                "Check the secret and write the episodes",
+                "chaic episodes open --secret secret.txt --commitment commitment.json --out episodes",
+            ),
+            ("Play them", "chaic eval --episodes episodes --helper none,rhp --out runs/opened"),
+            ("Check a file", "chaic episodes validate episodes/obstacle-000.json"),
+        ],
+    ),
+    (
         "chaic episodes schema",
         [
             ("Print the schema", "chaic episodes schema"),

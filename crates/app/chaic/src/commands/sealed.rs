@@ -1,0 +1,96 @@
+//! `chaic episodes seal` and `chaic episodes open`.
+
+use std::path::Path;
+
+use anyhow::{Context as _, Result};
+use chaic_arena::{Commitment, SealedSplit, Secret};
+use chaic_core::TaskId;
+use chaic_files::{read_user_file, write_atomically};
+use serde_json::json;
+
+use super::bars;
+use crate::exit::ExitStatus;
+use crate::interrupt;
+use crate::output::{OutputFormat, counted, print_error, print_result};
+
+/// File of the commitment in the folder of a sealed split.
+const COMMITMENT: &str = "commitment.json";
+/// Folder of the episodes in the folder of a sealed split.
+const EPISODES: &str = "episodes";
+/// Maximum size of a commitment, bytes: one takes about 500.
+const MAX_COMMITMENT_BYTES: u64 = 64 << 10;
+
+/// Makes a sealed split. A secret that exists is used again, so that an interrupted command can be
+/// repeated.
+pub(super) fn seal(
+    secret_path: &Path,
+    tasks: &[TaskId],
+    n_episodes: usize,
+    out: &Path,
+    format: OutputFormat,
+) -> Result<ExitStatus> {
+    let secret = if secret_path.exists() {
+        Secret::read(secret_path)?
+    } else {
+        Secret::create(secret_path)?
+    };
+    let split = SealedSplit::new(secret, tasks.to_vec(), n_episodes);
+    let episodes = out.join(EPISODES);
+    let Some(commitment) = write_episodes(&split, &episodes)? else {
+        return Ok(ExitStatus::Interrupted);
+    };
+    let path = out.join(COMMITMENT);
+    write_atomically(&path, commitment.to_json().as_bytes())?;
+    let json = json!({
+        "split": split.name(), "episodes": split.len(), "secret": secret_path,
+        "commitment": path, "folder": episodes,
+    });
+    let text = format!(
+        "{}: {} of {}\n{}: publish this file\n{}: keep this file to yourself until you open the split\n",
+        episodes.display(),
+        counted(split.len(), "episode"),
+        split.name(),
+        path.display(),
+        secret_path.display()
+    );
+    print_result(format, &json, &text)?;
+    Ok(ExitStatus::Success)
+}
+
+/// Opens a sealed split.
+pub(super) fn open(
+    secret_path: &Path,
+    commitment_path: &Path,
+    out: &Path,
+    format: OutputFormat,
+) -> Result<ExitStatus> {
+    let bytes = read_user_file(commitment_path, MAX_COMMITMENT_BYTES)?;
+    let name = commitment_path.display().to_string();
+    let commitment = Commitment::parse(&bytes).with_context(|| name.clone())?;
+    let split = commitment.split(Secret::read(secret_path)?).with_context(|| name.clone())?;
+    let Some(opened) = write_episodes(&split, out)? else {
+        return Ok(ExitStatus::Interrupted);
+    };
+    commitment.check_episodes(&opened).context(name)?;
+    let json = json!({ "split": split.name(), "episodes": split.len(), "folder": out });
+    let text = format!(
+        "{}: {} of {}, the committed ones\n",
+        out.display(),
+        counted(split.len(), "episode"),
+        split.name()
+    );
+    print_result(format, &json, &text)?;
+    Ok(ExitStatus::Success)
+}
+
+/// Writes the episodes of a split. Returns `None` if the user stopped it.
+fn write_episodes(split: &SealedSplit, folder: &Path) -> Result<Option<Commitment>> {
+    let stop = interrupt::stop_flag()?;
+    let bar = bars::count_bar(split.len() as u64, "episodes");
+    let commitment = split.write(folder, stop, &mut || bar.inc(1))?;
+    bar.finish_and_clear();
+    if commitment.is_none() {
+        print_error("stopped; the same command starts again");
+    }
+    Ok(commitment)
+}

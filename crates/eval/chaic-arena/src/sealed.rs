@@ -1,0 +1,309 @@
+//! Episodes that follow from a secret, and the public commitment to them.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use chaic_core::TaskId;
+use chaic_episodes::{
+    Episode, GenerateError, GeneratorSeeds, SeedRange, Settings, generate_episode,
+};
+use chaic_files::{FileError, write_atomically};
+use hkdf::Hkdf;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::secret::{Secret, to_hex};
+
+/// Format of [`Commitment`].
+const FORMAT: &str = "chaic-sealed-split";
+/// Version of the format and of the derivation of seeds.
+const VERSION: u32 = 1;
+/// Separates the uses of the secret from each other, and from those of other programs.
+const DOMAIN: &[u8] = b"chaic sealed split 1";
+/// Maximum number of episodes per task.
+const MAX_PER_TASK: usize = 10_000;
+
+/// Reason why a sealed split cannot be made or opened.
+#[derive(Debug, thiserror::Error)]
+pub enum ArenaError {
+    /// A file operation failed.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// An episode cannot be generated.
+    #[error(transparent)]
+    Generate(#[from] GenerateError),
+    /// The text is not a commitment.
+    #[error("not a commitment of a sealed split: {0}")]
+    Format(String),
+    /// The commitment is to another secret.
+    #[error(
+        "the secret is not that of the commitment, whose SHA-256 is {expected}; this one's is {found}"
+    )]
+    OtherSecret {
+        /// Digest in the commitment.
+        expected: String,
+        /// Digest of the secret.
+        found: String,
+    },
+    /// The secret is right, but the episodes are not.
+    #[error(
+        "the episodes differ from those of the commitment, which chaic {sealed_by} made; use that version"
+    )]
+    OtherEpisodes {
+        /// Version of chaic in the commitment.
+        sealed_by: String,
+    },
+}
+
+/// Public description of a sealed split, `commitment.json`. It discloses nothing about the episodes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Commitment {
+    format: String,
+    version: u32,
+    /// Version of chaic that generated the episodes.
+    chaic: String,
+    /// Tasks of the split.
+    tasks: Vec<TaskId>,
+    /// Episodes of each task.
+    n_episodes: usize,
+    /// SHA-256 of the domain and the secret.
+    secret_sha256: String,
+    /// SHA-256 of all episodes, each as one line of JSON, in the order of tasks and numbers.
+    episodes_sha256: String,
+}
+
+impl Commitment {
+    /// Reads `commitment.json`.
+    ///
+    /// # Errors
+    /// [`ArenaError::Format`] with the problem.
+    pub fn parse(bytes: &[u8]) -> Result<Commitment, ArenaError> {
+        let problem = |problem: String| Err(ArenaError::Format(problem));
+        let commitment: Commitment = match serde_json::from_slice(bytes) {
+            Ok(commitment) => commitment,
+            Err(error) => return problem(error.to_string()),
+        };
+        let Commitment { format, version, tasks, n_episodes, .. } = &commitment;
+        let has_duplicates = (1..tasks.len()).any(|k| tasks[..k].contains(&tasks[k]));
+        if format != FORMAT || *version != VERSION {
+            return problem(format!("`{format}` {version}, expected `{FORMAT}` {VERSION}"));
+        }
+        if tasks.is_empty() || has_duplicates || !(1..=MAX_PER_TASK).contains(n_episodes) {
+            return problem(format!(
+                "`tasks` must differ, and `n_episodes` must be from 1 to {MAX_PER_TASK}"
+            ));
+        }
+        Ok(commitment)
+    }
+
+    /// Returns the file content.
+    pub fn to_json(&self) -> String {
+        serde_json::to_string_pretty(self).expect("plain fields") + "\n"
+    }
+
+    /// Returns the split of this commitment.
+    ///
+    /// # Errors
+    /// [`ArenaError::OtherSecret`] if the secret is another one.
+    pub fn split(&self, secret: Secret) -> Result<SealedSplit, ArenaError> {
+        let split = SealedSplit { secret, tasks: self.tasks.clone(), n_episodes: self.n_episodes };
+        let (expected, found) = (self.secret_sha256.clone(), split.secret_sha256());
+        if expected == found { Ok(split) } else { Err(ArenaError::OtherSecret { expected, found }) }
+    }
+
+    /// Checks that this is the commitment to the same episodes.
+    ///
+    /// # Errors
+    /// [`ArenaError::OtherEpisodes`] if it is not.
+    pub fn check_episodes(&self, opened: &Commitment) -> Result<(), ArenaError> {
+        if self.episodes_sha256 == opened.episodes_sha256 {
+            return Ok(());
+        }
+        Err(ArenaError::OtherEpisodes { sealed_by: self.chaic.clone() })
+    }
+}
+
+/// Episodes of the standard split's kind, with seeds from a secret.
+#[derive(Clone, Debug)]
+pub struct SealedSplit {
+    secret: Secret,
+    tasks: Vec<TaskId>,
+    n_episodes: usize,
+}
+
+impl SealedSplit {
+    /// Creates a split with `n_episodes` episodes (1 to 10,000) of each task.
+    pub fn new(secret: Secret, tasks: Vec<TaskId>, n_episodes: usize) -> SealedSplit {
+        assert!((1..=MAX_PER_TASK).contains(&n_episodes), "{n_episodes} episodes");
+        SealedSplit { secret, tasks, n_episodes }
+    }
+
+    /// Returns the number of episodes of all tasks.
+    pub fn len(&self) -> usize {
+        self.tasks.len() * self.n_episodes
+    }
+
+    /// Returns true if there are no tasks.
+    pub fn is_empty(&self) -> bool {
+        self.tasks.is_empty()
+    }
+
+    /// Returns the name of the split: `sealed-` and the first digits of the commitment.
+    pub fn name(&self) -> String {
+        format!("sealed-{}", &self.secret_sha256()[..8])
+    }
+
+    fn secret_sha256(&self) -> String {
+        to_hex(&Sha256::new().chain_update(DOMAIN).chain_update(self.secret.key()).finalize())
+    }
+
+    /// Returns the seed of an episode: HKDF (RFC 5869) with SHA-256.
+    fn seed(&self, task: TaskId, k: usize) -> u64 {
+        let derivation = Hkdf::<Sha256>::new(Some(DOMAIN), self.secret.key());
+        let mut bytes = [0; 8];
+        let info = format!("{task}/{k}");
+        derivation.expand(info.as_bytes(), &mut bytes).expect("8 bytes are few enough");
+        // The range has a power of two as size.
+        SeedRange::SEALED.first + u64::from_le_bytes(bytes) % SeedRange::SEALED.count
+    }
+
+    /// Generates the `k`-th episode of a task.
+    ///
+    /// # Errors
+    /// [`GenerateError`] if its seed has no episode, which is a defect of the generator.
+    pub fn episode(&self, task: TaskId, k: usize) -> Result<Episode, GenerateError> {
+        let seed = self.seed(task, k);
+        let (id, split) = (format!("{task}/{}/{k:03}", self.name()), self.name());
+        let seeds = GeneratorSeeds { place: seed, episode: seed };
+        generate_episode(id, split, task, seeds, Settings::STANDARD)
+    }
+
+    /// Writes each episode to a file `TASK-NNN.json` of a folder, and returns the commitment. Returns
+    /// `None` if `stop` is raised. `progress` is called after each episode.
+    ///
+    /// # Errors
+    /// [`ArenaError`] if an episode cannot be generated or written.
+    pub fn write(
+        &self,
+        folder: &Path,
+        stop: &AtomicBool,
+        progress: &mut dyn FnMut(),
+    ) -> Result<Option<Commitment>, ArenaError> {
+        std::fs::create_dir_all(folder).map_err(FileError::context("make the folder", folder))?;
+        let mut digest = Sha256::new();
+        for task in &self.tasks {
+            for k in 0..self.n_episodes {
+                if stop.load(Ordering::Relaxed) {
+                    return Ok(None);
+                }
+                let episode = self.episode(*task, k)?;
+                digest.update(episode.to_json_line());
+                digest.update("\n");
+                let path = folder.join(format!("{task}-{k:03}.json"));
+                write_atomically(&path, episode.to_json().as_bytes())?;
+                progress();
+            }
+        }
+        Ok(Some(Commitment {
+            format: FORMAT.to_owned(),
+            version: VERSION,
+            chaic: env!("CARGO_PKG_VERSION").to_owned(),
+            tasks: self.tasks.clone(),
+            n_episodes: self.n_episodes,
+            secret_sha256: self.secret_sha256(),
+            episodes_sha256: to_hex(&digest.finalize()),
+        }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    fn split(digit: char) -> SealedSplit {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("secret");
+        std::fs::write(&path, digit.to_string().repeat(64)).expect("a file");
+        let secret = Secret::read(&path).expect("64 digits");
+        SealedSplit::new(secret, TaskId::paper().collect(), 2)
+    }
+
+    fn write(split: &SealedSplit) -> (tempfile::TempDir, Commitment) {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut n = 0;
+        let commitment = split.write(folder.path(), &AtomicBool::new(false), &mut || n += 1);
+        assert_eq!(n, split.len());
+        (folder, commitment.expect("episodes").expect("it was not stopped"))
+    }
+
+    /// The derivation must not change: an organizer may open a split years later.
+    #[test]
+    fn seeds_follow_from_the_secret_alone() {
+        let split = split('0');
+        assert_eq!(split.name(), "sealed-92f4e7f3");
+        let obstacle: TaskId = "obstacle".parse().expect("a task");
+        // Computed with Python's `hmac` and `hashlib`.
+        let seeds = [0, 1].map(|k| split.seed(obstacle, k));
+        assert_eq!(seeds, [6_501_053_554_782_317, 7_645_185_919_311_213]);
+    }
+
+    #[test]
+    fn seeds_are_unique() {
+        let split = SealedSplit { n_episodes: 500, ..split('1') };
+        let seeds: BTreeSet<u64> = TaskId::paper()
+            .flat_map(|t| (0..500).map(move |k| (t, k)))
+            .map(|(t, k)| split.seed(t, k))
+            .collect();
+        assert_eq!(seeds.len(), split.len());
+        assert!(seeds.iter().all(|seed| SeedRange::SEALED.seeds().contains(seed)));
+    }
+
+    #[test]
+    fn the_same_secret_opens_a_commitment_and_no_other_does() {
+        let (folder, commitment) = write(&split('2'));
+        let read = Commitment::parse(commitment.to_json().as_bytes()).expect("its own format");
+        assert_eq!(read, commitment);
+        let opened = read.split(split('2').secret).expect("the committed secret");
+        let (other_folder, again) = write(&opened);
+        read.check_episodes(&again).expect("the same episodes");
+        for task in TaskId::paper() {
+            let name = format!("{task}-001.json");
+            let bytes = [&folder, &other_folder].map(|f| std::fs::read(f.path().join(&name)));
+            let [a, b] = bytes.map(|bytes| bytes.expect("the file"));
+            assert!(a == b, "{name} differs");
+            let episode = Episode::parse(&a, &name).expect("a valid episode");
+            assert_eq!(episode.id(), format!("{task}/{}/001", opened.name()));
+        }
+        assert!(matches!(read.split(split('3').secret), Err(ArenaError::OtherSecret { .. })));
+        let (_, other) = write(&split('3'));
+        assert!(matches!(read.check_episodes(&other), Err(ArenaError::OtherEpisodes { .. })));
+    }
+
+    #[test]
+    fn damaged_commitments_are_refused() {
+        let (_, commitment) = write(&SealedSplit { n_episodes: 1, ..split('4') });
+        let text = commitment.to_json();
+        let damaged = [
+            "{".to_owned(),
+            text[..text.len() / 2].to_owned(),
+            text.replace(FORMAT, "chaic-episode"),
+            text.replace("\"version\": 1", "\"version\": 2"),
+            text.replace("\"n_episodes\": 1", "\"n_episodes\": 10001"),
+            text.replace("obstacle", "shopping"),
+        ];
+        for text in damaged {
+            let result = Commitment::parse(text.as_bytes());
+            assert!(matches!(result, Err(ArenaError::Format(_))), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_stopped_split_has_no_commitment() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let written = split('5').write(folder.path(), &AtomicBool::new(true), &mut || ());
+        assert!(written.expect("a folder").is_none());
+    }
+}

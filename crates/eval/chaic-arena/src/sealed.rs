@@ -133,9 +133,11 @@ pub struct SealedSplit {
 }
 
 impl SealedSplit {
-    /// Creates a split with `n_episodes` episodes (1 to 10,000) of each task.
-    pub fn new(secret: Secret, tasks: Vec<TaskId>, n_episodes: usize) -> SealedSplit {
+    /// Creates a split with `n_episodes` episodes (1 to 10,000) of each task. A task counts once.
+    pub fn new(secret: Secret, tasks: &[TaskId], n_episodes: usize) -> SealedSplit {
         assert!((1..=MAX_PER_TASK).contains(&n_episodes), "{n_episodes} episodes");
+        let is_first = |k: &usize| !tasks[..*k].contains(&tasks[*k]);
+        let tasks = (0..tasks.len()).filter(is_first).map(|k| tasks[k]).collect();
         SealedSplit { secret, tasks, n_episodes }
     }
 
@@ -228,7 +230,9 @@ mod tests {
         let path = folder.path().join("secret");
         std::fs::write(&path, digit.to_string().repeat(64)).expect("a file");
         let secret = Secret::read(&path).expect("64 digits");
-        SealedSplit::new(secret, TaskId::paper().collect(), 2)
+        // A task that is named twice counts once.
+        let tasks: Vec<TaskId> = TaskId::paper().chain(TaskId::paper()).collect();
+        SealedSplit::new(secret, &tasks, 2)
     }
 
     fn write(split: &SealedSplit) -> (tempfile::TempDir, Commitment) {
@@ -236,6 +240,7 @@ mod tests {
         let mut n = 0;
         let commitment = split.write(folder.path(), &AtomicBool::new(false), &mut || n += 1);
         assert_eq!(n, split.len());
+        assert_eq!(split.len(), TaskId::paper().count() * split.n_episodes);
         (folder, commitment.expect("episodes").expect("it was not stopped"))
     }
 

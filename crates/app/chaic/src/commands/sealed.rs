@@ -34,7 +34,7 @@ pub(super) fn seal(
     } else {
         Secret::create(secret_path)?
     };
-    let split = SealedSplit::new(secret, tasks.to_vec(), n_episodes);
+    let split = SealedSplit::new(secret, tasks, n_episodes);
     let episodes = out.join(EPISODES);
     let Some(commitment) = write_episodes(&split, &episodes)? else {
         return Ok(ExitStatus::Interrupted);

@@ -1,4 +1,4 @@
-//! Sealed splits: evaluation on episodes that only the organizer knows.
+//! Makes sealed splits, whose episodes only the organizer knows.
 //!
 //! An organizer holds a [`Secret`] and publishes a [`Commitment`] to it. A [`SealedSplit`] derives the
 //! seeds of its episodes from the secret, so the episodes are unknown until the secret is. Once it is

@@ -142,13 +142,8 @@ impl SealedSplit {
     }
 
     /// Returns the number of episodes of all tasks.
-    pub fn len(&self) -> usize {
+    pub fn n_total(&self) -> usize {
         self.tasks.len() * self.n_episodes
-    }
-
-    /// Returns true if there are no tasks.
-    pub fn is_empty(&self) -> bool {
-        self.tasks.is_empty()
     }
 
     /// Returns the name of the split: `sealed-` and the first digits of the commitment.
@@ -239,8 +234,8 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let mut n = 0;
         let commitment = split.write(folder.path(), &AtomicBool::new(false), &mut || n += 1);
-        assert_eq!(n, split.len());
-        assert_eq!(split.len(), TaskId::paper().count() * split.n_episodes);
+        assert_eq!(n, split.n_total());
+        assert_eq!(split.n_total(), TaskId::paper().count() * split.n_episodes);
         (folder, commitment.expect("episodes").expect("it was not stopped"))
     }
 
@@ -262,7 +257,7 @@ mod tests {
             .flat_map(|t| (0..500).map(move |k| (t, k)))
             .map(|(t, k)| split.seed(t, k))
             .collect();
-        assert_eq!(seeds.len(), split.len());
+        assert_eq!(seeds.len(), split.n_total());
         assert!(seeds.iter().all(|seed| SeedRange::SEALED.seeds().contains(seed)));
     }
 

@@ -47,6 +47,8 @@ pub struct ScalingBench {
 pub struct ScalingEstimate {
     /// Number of measured environments.
     pub envs: usize,
+    /// Number of environments of [`CoreSpeed::large_batch`].
+    pub large_envs: usize,
     /// Number of measured decisions.
     pub steps: usize,
     /// Time of a decision on one thread, milliseconds: simulation, partner and the helper's images.
@@ -74,7 +76,7 @@ pub struct CoreSpeed {
     pub cores: usize,
     /// Batch of the measured environments; each step waits for the slowest.
     pub batch: f64,
-    /// Batch of 16 times as many environments.
+    /// Batch of [`ScalingEstimate::large_envs`] environments.
     pub large_batch: f64,
     /// Environments that do not wait for each other.
     pub independent: f64,
@@ -121,6 +123,7 @@ impl ScalingBench {
         let node = |nodes: usize| self.cluster.speed(nodes, mean_s, image_bytes);
         Ok(ScalingEstimate {
             envs,
+            large_envs: COPIES * envs,
             steps: n,
             mean_ms: 1e3 * mean_s,
             p99_ms: 1e3 * each[n * 99 / 100],

@@ -206,7 +206,7 @@ fn scaling_text(estimate: &ScalingEstimate) -> String {
         estimate;
     let whole = |rate: f64| format!("{rate:.0}");
     let percent = |fraction: f64| format!("{:.0} %", 100.0 * fraction);
-    let large = format!("Batch of {}", 16 * envs);
+    let large = format!("Batch of {}", estimate.large_envs);
     let mut cores = table(["Cores", &format!("Batch of {envs}"), &large, "Independent"]);
     for speed in &estimate.cores {
         let rates = [speed.batch, speed.large_batch, speed.independent].map(whole);

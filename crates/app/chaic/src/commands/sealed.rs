@@ -42,13 +42,13 @@ pub(super) fn seal(
     let path = out.join(COMMITMENT);
     write_atomically(&path, commitment.to_json().as_bytes())?;
     let json = json!({
-        "split": split.name(), "episodes": split.len(), "secret": secret_path,
+        "split": split.name(), "episodes": split.n_total(), "secret": secret_path,
         "commitment": path, "folder": episodes,
     });
     let text = format!(
         "{}: {} of {}\n{}: publish this file\n{}: keep this file to yourself until you open the split\n",
         episodes.display(),
-        counted(split.len(), "episode"),
+        counted(split.n_total(), "episode"),
         split.name(),
         path.display(),
         secret_path.display()
@@ -72,11 +72,11 @@ pub(super) fn open(
         return Ok(ExitStatus::Interrupted);
     };
     commitment.check_episodes(&opened).context(name)?;
-    let json = json!({ "split": split.name(), "episodes": split.len(), "folder": out });
+    let json = json!({ "split": split.name(), "episodes": split.n_total(), "folder": out });
     let text = format!(
         "{}: {} of {}, the committed ones\n",
         out.display(),
-        counted(split.len(), "episode"),
+        counted(split.n_total(), "episode"),
         split.name()
     );
     print_result(format, &json, &text)?;
@@ -86,7 +86,7 @@ pub(super) fn open(
 /// Writes the episodes of a split. Returns `None` if the user stopped it.
 fn write_episodes(split: &SealedSplit, folder: &Path) -> Result<Option<Commitment>> {
     let stop = interrupt::stop_flag()?;
-    let bar = bars::count_bar(split.len() as u64, "episodes");
+    let bar = bars::count_bar(split.n_total() as u64, "episodes");
     let commitment = split.write(folder, stop, &mut || bar.inc(1))?;
     bar.finish_and_clear();
     if commitment.is_none() {

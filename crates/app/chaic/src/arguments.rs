@@ -30,7 +30,7 @@ pub use self::eval::{EvalArguments, EvalCommand, LanguageArguments, ModelEvaluat
 pub use self::exec::{
     ExecArguments, HelperArgument, HelperCheckArguments, HelperCommand, HelperServeArguments,
 };
-pub use self::export::{ExportCommand, LeRobotArguments};
+pub use self::export::{EpisodesArguments, ExportCommand, LeRobotArguments};
 pub use self::fidelity::FidelityArguments;
 pub use self::help::command;
 pub use self::llm::LlmCommand;

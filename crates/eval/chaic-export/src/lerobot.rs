@@ -5,17 +5,19 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use chaic_core::{Action, AgentId, EntityId, Frame, Hand, ResolvedAction};
+use chaic_env::Playback;
 use chaic_env::trace::{Decision, Trace};
-use chaic_env::{EnvError, Playback};
 use chaic_episodes::Episode;
 use chaic_files::{FileError, write_atomically};
 use chaic_render::{Channels, Scene, View};
-use chaic_video::{VideoError, VideoWriter};
+use chaic_video::VideoWriter;
 use chaic_world::World;
 use image::RgbImage;
-use parquet::errors::ParquetError;
 use serde_json::{Value, json};
 
+use crate::card::{DataType, DatasetDescription, Field, FileGroup, Place, RecordSet, common};
+use crate::error::ExportError;
+use crate::folder as dataset_folder;
 use crate::table::{self, Column};
 
 /// Frames per second of the export, as in replays. The world itself has no unit of seconds.
@@ -52,39 +54,6 @@ pub const KINDS: [&str; 8] = [
     "remove_obstacle",
     "wait",
 ];
-
-/// Error when a data set is exported.
-#[derive(Debug, thiserror::Error)]
-pub enum ExportError {
-    /// The trace does not match its episode.
-    #[error(transparent)]
-    Env(#[from] EnvError),
-    /// A file cannot be written.
-    #[error(transparent)]
-    File(#[from] FileError),
-    /// A table cannot be written.
-    #[error("{path}: {problem}")]
-    Table {
-        /// Path of the table.
-        path: PathBuf,
-        /// Error of the Parquet library.
-        problem: ParquetError,
-    },
-    /// A video cannot be written.
-    #[error(transparent)]
-    Video(#[from] VideoError),
-    /// The folder is not empty.
-    #[error("{0} isn't empty; choose another --out")]
-    NotEmpty(PathBuf),
-    /// The sampling interval does not give a whole number of images per second.
-    #[error(
-        "an interval of {0} frames does not divide a second of {FRAMES_PER_S} frames; choose a divisor of {FRAMES_PER_S}"
-    )]
-    Rate(u32),
-    /// The episode has no such agent.
-    #[error("{0} has no {1}")]
-    NoAgent(String, AgentId),
-}
 
 /// Options of the export.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -168,10 +137,7 @@ impl LeRobotWriter {
         if options.every == 0 || !FRAMES_PER_S.is_multiple_of(options.every) {
             return Err(ExportError::Rate(options.every));
         }
-        if fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some()) {
-            return Err(ExportError::NotEmpty(folder.to_owned()));
-        }
-        fs::create_dir_all(folder).map_err(FileError::context("make", folder))?;
+        dataset_folder::create_empty(folder)?;
         Ok(LeRobotWriter {
             folder: folder.to_owned(),
             options,
@@ -345,7 +311,45 @@ impl LeRobotWriter {
         };
         json("stats.json", &self.stats())?;
         json("info.json", &self.info())?;
+        dataset_folder::write_description(&self.folder, "chaic-lerobot", &self.description())?;
         Ok(self.n_frames)
+    }
+
+    fn description(&self) -> DatasetDescription {
+        let agent = self.options.agent;
+        let n = self.episodes.len();
+        DatasetDescription {
+            title: format!("chaic runs: {agent}"),
+            summary: format!(
+                "Observations and actions of the {agent} in {n} recorded episodes of the benchmark Constrained Human-AI \
+                 Cooperation (CHAIC), in version 3.0 of the LeRobot format."
+            ),
+            collection: format!(
+                "Recorded by chaic {} and played again for the images, which have {} pixels a side and {} samples per \
+                 second (`chaic export lerobot`). Each trace was verified before.",
+                env!("CARGO_PKG_VERSION"),
+                self.options.image_size,
+                self.fps()
+            ),
+            uses: &[
+                "Imitation learning, offline reinforcement learning and models of behavior.",
+                "Scores of trained helpers come from `chaic eval` on other episodes.",
+            ],
+            limitations: &[
+                "The state vector holds the true position, which helpers on the hidden track estimate.",
+                "Videos are compressed; `chaic replay` and `chaic render` give exact images.",
+                "Depth images, object ids and the hidden goal are not included.",
+            ],
+            biases: common::BIASES,
+            tags: &["LeRobot", "chaic", "embodied-ai", "human-ai-cooperation", "simulation"],
+            files: file_groups(),
+            records: RecordSet {
+                name: "frames",
+                files: "data-files",
+                description: "one record per sampled frame, in the order of time.",
+                fields: frame_fields(),
+            },
+        }
     }
 
     fn write_episodes(&self) -> Result<(), ExportError> {
@@ -446,6 +450,56 @@ impl LeRobotWriter {
             },
         })
     }
+}
+
+fn file_groups() -> Vec<FileGroup> {
+    let group = |name, pattern, media_type, description| FileGroup {
+        name,
+        pattern,
+        media_type,
+        description,
+    };
+    vec![
+        group("data-files", "data/*/*.parquet", "application/x-parquet", "Frames of one episode"),
+        group("video-files", "videos/*/*/*.mp4", "video/mp4", "First-person video of one episode"),
+        group("meta-files", "meta/*.json", "application/json", "Features and statistics"),
+    ]
+}
+
+/// Describes the columns that [`LeRobotWriter::write_episode`] writes.
+fn frame_fields() -> Vec<Field> {
+    let field = |name, data_type, description: &str| Field {
+        name,
+        data_type,
+        is_list: false,
+        description: description.to_owned(),
+        place: Place::Column(name),
+    };
+    let list = |name, description: String| Field {
+        is_list: true,
+        description,
+        ..field(name, DataType::Float, "")
+    };
+    vec![
+        list("observation.state", format!("State of the agent: {}", STATE.join(", "))),
+        list("action", format!("Action: {}; kinds are {}", ACTION.join(", "), KINDS.join(", "))),
+        field("plan", DataType::Text, "Current plan in words; empty if there is none"),
+        field(
+            "next.reward",
+            DataType::Float,
+            "Increase of the delivered fraction until the next sample",
+        ),
+        field("next.done", DataType::Boolean, "Whether this is the last sample of the episode"),
+        field(
+            "timestamp",
+            DataType::Float,
+            "Time since the start of the episode, s at 30 frames per second",
+        ),
+        field("frame_index", DataType::Integer, "Number of the sample within the episode"),
+        field("episode_index", DataType::Integer, "Number of the episode"),
+        field("index", DataType::Integer, "Number of the sample within the data set"),
+        field("task_index", DataType::Integer, "Number of the task in `meta/tasks.parquet`"),
+    ]
 }
 
 fn write_table(

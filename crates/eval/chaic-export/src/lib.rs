@@ -1,11 +1,20 @@
-//! Export of recorded runs to data set formats of other programs.
+//! Export of recorded runs and of splits as data sets for other programs.
 //!
 //! **What it is**: [`lerobot`] exports the observations and actions of an agent from recorded
-//! episodes, in version 3 of the LeRobot format. [`table`] writes Parquet files.
+//! episodes, in version 3 of the LeRobot format. [`episodes`] exports the initial states of a split.
+//! Each data set has a [`card`] for people and [`croissant`] metadata for programs. [`table`] writes
+//! Parquet files.
 //!
 //! **What it is not**: it plays no episodes other than traces, and trains no models.
 //!
 //! **Invariant**: after an interruption, the data set is complete for the episodes exported so far.
 
+pub mod card;
+pub mod croissant;
+pub mod episodes;
+mod error;
+mod folder;
 pub mod lerobot;
 pub mod table;
+
+pub use error::ExportError;

@@ -11,7 +11,8 @@ use chaic_env::rules::RuleSet;
 use chaic_env::trace::{Record, Trace};
 use chaic_env::{AdvanceOutcome, Env, EpisodeConfig};
 use chaic_episodes::{Episode, find_episode};
-use chaic_export::lerobot::{ExportError, LeRobotOptions, LeRobotWriter};
+use chaic_export::ExportError;
+use chaic_export::lerobot::{LeRobotOptions, LeRobotWriter};
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::record::{Field, Row};
 

@@ -3,15 +3,32 @@
 use std::path::PathBuf;
 
 use chaic_core::{AgentId, TaskId};
+use chaic_episodes::Split;
 use clap::{Args, Subcommand};
 
-use super::{agent, task};
+use super::{Tasks, agent, task, tasks};
 
 /// `chaic export`.
 #[derive(Debug, Subcommand)]
 pub enum ExportCommand {
     /// Export a LeRobot data set, version 3: Parquet tables and an MP4 video of each episode.
     Lerobot(LeRobotArguments),
+    /// Export the initial states of a split: a JSON file of each episode, a card and Croissant metadata.
+    Episodes(EpisodesArguments),
+}
+
+/// `chaic export episodes`.
+#[derive(Args, Debug)]
+pub struct EpisodesArguments {
+    /// Split: standard, gen:A..B, gen-standard:A..B, test or train.
+    #[arg(long, value_name = "SPLIT")]
+    pub split: Split,
+    /// Tasks, separated by commas, or `all`.
+    #[arg(long, alias = "tasks", value_name = "NAMES", value_parser = tasks, default_value = "all")]
+    pub task: Tasks,
+    /// An empty folder for the data set.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
 }
 
 /// `chaic export lerobot`.

@@ -8,6 +8,7 @@ use chaic_core::TaskId;
 use chaic_episodes::{Episode, EpisodeError, Split, episodes, find_episode, json_schema};
 use chaic_eval::frame_export;
 use chaic_eval::read_episode_file;
+use chaic_export::episodes::file_name;
 use chaic_files::write_atomically;
 use comfy_table::Table;
 use serde_json::json;
@@ -129,10 +130,7 @@ fn generate(task: TaskId, split: &Split, out: &Path, format: OutputFormat) -> Re
         }
         let id = split.episode_id(task, k);
         let episode = find_episode(&id)?;
-        // `obstacle/gen/7` is written to `obstacle-7.json`, and `obstacle/standard/007` to
-        // `obstacle-standard-007.json`.
-        let name = id.replace("/gen/", "-").replace('/', "-");
-        let path = out.join(format!("{name}.json"));
+        let path = out.join(file_name(&id));
         write_atomically(&path, episode.to_json().as_bytes())?;
         bar.inc(1);
     }

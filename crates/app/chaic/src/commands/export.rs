@@ -4,24 +4,56 @@ use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
 use anyhow::{Result, bail};
+use chaic_episodes::episodes;
 use chaic_eval::EvalError;
 use chaic_eval::run::{RunFolder, RunOptions};
 use chaic_eval::verify::verify_trace;
+use chaic_export::episodes::EpisodeSetWriter;
 use chaic_export::lerobot::{LeRobotOptions, LeRobotWriter};
 use serde_json::json;
 
 use super::bars;
 use super::recorded::RecordedHelpers;
-use crate::arguments::{ExportCommand, LeRobotArguments};
+use crate::arguments::{EpisodesArguments, ExportCommand, LeRobotArguments};
 use crate::exit::ExitStatus;
 use crate::interrupt;
 use crate::output::{OutputFormat, counted, print_error, print_result, print_warning, quoted_path};
 
-/// Exports recorded episodes.
+/// Exports recorded episodes or a split.
 pub fn run(command: &ExportCommand, format: OutputFormat) -> Result<ExitStatus> {
     match command {
         ExportCommand::Lerobot(arguments) => lerobot(arguments, format),
+        ExportCommand::Episodes(arguments) => export_episodes(arguments, format),
     }
+}
+
+fn export_episodes(arguments: &EpisodesArguments, format: OutputFormat) -> Result<ExitStatus> {
+    let EpisodesArguments { split, task, out } = arguments;
+    let total: u64 = task.0.iter().map(|task| split.len_of(*task) as u64).sum();
+    if total == 0 {
+        bail!("{split} has no episodes of these tasks, which are not the paper's; choose gen:A..B");
+    }
+    let stop = interrupt::stop_flag()?;
+    let mut writer = EpisodeSetWriter::create(out)?;
+    let bar = bars::count_bar(total, "episodes");
+    let mut is_complete = true;
+    for episode in task.0.iter().flat_map(|task| episodes(split, *task)) {
+        if stop.load(Ordering::Relaxed) {
+            is_complete = false;
+            break;
+        }
+        writer.add(&episode?)?;
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let n = writer.finish(split)?;
+    let text = format!("{}: {}\n", quoted_path(out), counted(n, "episode"));
+    print_result(format, &json!({ "out": out, "episodes": n }), &text)?;
+    if !is_complete {
+        print_error("stopped; the folder holds a valid data set of fewer episodes");
+        return Ok(ExitStatus::Interrupted);
+    }
+    Ok(ExitStatus::Success)
 }
 
 fn lerobot(arguments: &LeRobotArguments, format: OutputFormat) -> Result<ExitStatus> {

@@ -33,6 +33,31 @@ fn an_opponent_model_is_an_input_of_a_policy() {
     assert!(exported.contains("1 episode"), "{exported}");
     assert!(run_err(at, &["export", "lerobot", "run", "--out", "set"]).contains("isn't empty"));
     assert!(run_err(at, &["export", "lerobot", "p", "--out", "x"]).contains("is not a run"));
+    for file in ["README.md", "croissant.json"] {
+        let text = fs::read_to_string(at.join("set").join(file)).expect("it was written");
+        assert!(text.contains("next.reward"), "{text}");
+    }
+}
+
+/// The files of an exported split are playable, and its metadata describes them.
+#[test]
+fn a_split_is_exported_with_metadata() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let export = ["export", "episodes", "--split", "gen:7..9", "--task", "shopping,moving_house"];
+    let export = [&export[..], &["--out", "set"]].concat();
+    assert!(run_ok(at, &export).contains("4 episodes"));
+    assert!(run_err(at, &export).contains("isn't empty"));
+    run_ok(at, &["episodes", "validate", "set/episodes/shopping-7.json"]);
+    let metadata = fs::read(at.join("set/croissant.json")).expect("it was written");
+    let metadata: serde_json::Value = serde_json::from_slice(&metadata).expect("JSON");
+    assert_eq!(metadata["distribution"][0]["includes"], "episodes/*.json");
+    assert_eq!(
+        metadata["recordSet"][0]["field"][1]["source"]["extract"]["jsonPath"],
+        "$.setup.task"
+    );
+    let none = ["export", "episodes", "--split", "train", "--task", "tremor", "--out", "none"];
+    assert!(run_err(at, &none).contains("no episodes"));
 }
 
 #[test]

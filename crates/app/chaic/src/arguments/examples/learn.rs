@@ -155,4 +155,21 @@ pub(super) const EXAMPLES: &[CommandExamples] = &[
             ),
         ],
     ),
+    (
+        "chaic export episodes",
+        [
+            (
+                "Export the standard split",
+                "chaic export episodes --split standard --out data/standard",
+            ),
+            (
+                "Export episodes of a task for training",
+                "chaic export episodes --split gen:0..100 --task shopping --out data/shopping",
+            ),
+            (
+                "Export the training episodes",
+                "chaic export episodes --split train --out data/train",
+            ),
+        ],
+    ),
 ];

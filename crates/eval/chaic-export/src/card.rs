@@ -1,0 +1,162 @@
+//! Descriptions of data sets: facts as plain data, and the card (`README.md`) made from them.
+//! [`crate::croissant`] makes the metadata for programs from the same facts.
+
+use std::fmt::Write as _;
+
+/// License of all generated data, as an SPDX identifier.
+pub const LICENSE: &str = "MIT";
+
+/// Facts about a data set for its card and its metadata.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DatasetDescription {
+    /// Title of the data set, for example `chaic episodes: standard`.
+    pub title: String,
+    /// One or two sentences about the content.
+    pub summary: String,
+    /// How the data came about.
+    pub collection: String,
+    /// Uses that the data is meant for.
+    pub uses: &'static [&'static str],
+    /// What the data does not cover.
+    pub limitations: &'static [&'static str],
+    /// Ways in which the data differs from the world.
+    pub biases: &'static [&'static str],
+    /// Tags for catalogues of data sets.
+    pub tags: &'static [&'static str],
+    /// Files of one kind.
+    pub files: Vec<FileGroup>,
+    /// Records within the files of one group.
+    pub records: RecordSet,
+}
+
+/// Files of one kind within a data set.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FileGroup {
+    /// Short name, unique within the data set.
+    pub name: &'static str,
+    /// Glob pattern relative to the folder of the data set.
+    pub pattern: &'static str,
+    /// Media type.
+    pub media_type: &'static str,
+    /// Content of one file.
+    pub description: &'static str,
+}
+
+/// Records of a table or of one file each.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RecordSet {
+    /// Short name, unique within the data set.
+    pub name: &'static str,
+    /// Name of the [`FileGroup`] that holds the records.
+    pub files: &'static str,
+    /// One sentence about a record.
+    pub description: &'static str,
+    /// Fields of a record.
+    pub fields: Vec<Field>,
+}
+
+/// Field of a record.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Field {
+    /// Name, unique within the record.
+    pub name: &'static str,
+    /// Type of the value, or of the elements of a list.
+    pub data_type: DataType,
+    /// Whether the value is a list.
+    pub is_list: bool,
+    /// Meaning, with unit and range.
+    pub description: String,
+    /// Place of the value in a file.
+    pub place: Place,
+}
+
+/// Types of values in records.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DataType {
+    /// UTF-8 text.
+    Text,
+    /// Integer.
+    Integer,
+    /// Floating-point number.
+    Float,
+    /// True or false.
+    Boolean,
+}
+
+/// Place of a value in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// Column of a table.
+    Column(&'static str),
+    /// JSON path within a file that holds one record.
+    JsonPath(&'static str),
+}
+
+/// Facts that hold for all data sets of chaic.
+pub mod common {
+    /// Statement about personal data.
+    pub const PERSONAL_INFORMATION: &str =
+        "None. All people are simulated, and no recording of a real person was used.";
+    /// Statement about effects on society.
+    pub const SOCIAL_IMPACT: &str = "Helpers trained on simulated people with impairments can fail with real ones. The data must not \
+        be the only evidence that an assistant is safe or useful for a person with a disability.";
+    /// Biases of the simulation.
+    pub const BIASES: &[&str] = &[
+        "People follow the rules of the paper and never change their minds, speak or refuse help.",
+        "Constraints are simplified: one value each for reach, strength and speed, from the paper or chosen by chaic.",
+        "Houses, streets and yards are those of chaic's generators, with goods of a Western household.",
+    ];
+}
+
+impl DatasetDescription {
+    /// Returns the card in Markdown, with the header that Hugging Face reads.
+    pub fn to_markdown(&self) -> String {
+        let mut text = String::from("---\n");
+        let _ = writeln!(text, "license: {}", LICENSE.to_lowercase());
+        let _ = writeln!(text, "pretty_name: {:?}", self.title);
+        text.push_str("task_categories:\n- robotics\ntags:\n");
+        for tag in self.tags {
+            let _ = writeln!(text, "- {tag}");
+        }
+        let _ = write!(text, "---\n\n# {}\n\n{}\n\n", self.title, self.summary);
+        let _ = write!(text, "## Collection\n\n{}\n\n", self.collection);
+        let mut section = |title: &str, items: &[&str]| {
+            let _ = write!(text, "## {title}\n\n");
+            for item in items {
+                let _ = writeln!(text, "- {item}");
+            }
+            text.push('\n');
+        };
+        section("Intended use", self.uses);
+        section("Limitations", self.limitations);
+        section("Biases", self.biases);
+        section("Effects on society", &[common::SOCIAL_IMPACT]);
+        section("Personal data", &[common::PERSONAL_INFORMATION]);
+        self.write_content(&mut text);
+        text
+    }
+
+    fn write_content(&self, text: &mut String) {
+        text.push_str("## Content\n\n| files | content |\n|---|---|\n");
+        for group in &self.files {
+            let _ = writeln!(text, "| `{}` | {} |", group.pattern, group.description);
+        }
+        let RecordSet { name, description, fields, .. } = &self.records;
+        let _ = write!(
+            text,
+            "\n`{name}`: {description}\n\n| field | type | meaning |\n|---|---|---|\n"
+        );
+        for field in fields {
+            let list = if field.is_list { "list of " } else { "" };
+            let data_type = match field.data_type {
+                DataType::Text => "text",
+                DataType::Integer => "integer",
+                DataType::Float => "float",
+                DataType::Boolean => "boolean",
+            };
+            let _ =
+                writeln!(text, "| `{}` | {list}{data_type} | {} |", field.name, field.description);
+        }
+        text.push_str("\n`croissant.json` describes the files for programs (Croissant 1.0).\n");
+    }
+}

@@ -345,9 +345,9 @@ test("a person takes over from a frame of a replay", async () => {
 test("axe finds nothing, and nothing is wider than the page", async () => {
   for (const options of [
     { viewport: { width: 1280, height: 900 } },
-    { viewport: { width: 360, height: 740 } },
+    { viewport: { width: 320, height: 740 } },
     { viewport: { width: 1280, height: 900 }, colorScheme: "dark" },
-    { viewport: { width: 360, height: 740 }, forcedColors: "active" },
+    { viewport: { width: 320, height: 740 }, reducedMotion: "reduce", forcedColors: "active" },
   ]) {
     for (const [file, hash] of [
       [view, "#1@900"],

@@ -170,13 +170,13 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
         self.batch.reset([int(k) for k in worlds], episodes, seeds)
 
     def _advance(self) -> None:
+        """Advances all worlds, and renders the images of those that start a turn."""
         assert self.batch is not None
-        self._ended |= self.batch.advance() == 1
+        images = {part: self._arrays[part] for part in spaces.image_parts(self.parts)}
+        self._ended |= self.batch.advance_and_observe(**images) == 1
 
     def _observe(self) -> Arrays:
         assert self.batch is not None
-        images = {part: self._arrays[part] for part in spaces.image_parts(self.parts)}
-        self.batch.observe(**images)
         self.batch.own(self._proprioception, self._mask)
         if self.copy:
             return {part: array.copy() for part, array in self._arrays.items()}

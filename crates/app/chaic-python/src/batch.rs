@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
-use chaic_core::AgentId;
+use chaic_core::{AgentError, AgentId};
 use chaic_env::{AdvanceOutcome, Env, EnvBatch, EpisodeConfig, ImagesMut, SlotId};
-use numpy::{PyArray1, PyReadonlyArray2, PyReadwriteArray2, PyReadwriteArrayDyn};
+use numpy::{Element, PyArray1, PyReadonlyArray2, PyReadwriteArray2, PyReadwriteArrayDyn};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
@@ -36,6 +36,39 @@ impl Batch {
 /// Outcomes of `advance`.
 const NEEDS_ACTION: u8 = 0;
 const ENDED: u8 = 1;
+
+/// Arrays of the caller for the images of all slots.
+struct ImageArrays<'py> {
+    rgb: Option<PyReadwriteArrayDyn<'py, u8>>,
+    depth: Option<PyReadwriteArrayDyn<'py, f32>>,
+    ids: Option<PyReadwriteArrayDyn<'py, u16>>,
+}
+
+impl ImageArrays<'_> {
+    fn images(&mut self) -> PyResult<ImagesMut<'_>> {
+        Ok(ImagesMut {
+            rgb: slice_of(&mut self.rgb)?,
+            depth_m: slice_of(&mut self.depth)?,
+            ids: slice_of(&mut self.ids)?,
+        })
+    }
+}
+
+fn slice_of<'a, T: Element>(
+    array: &'a mut Option<PyReadwriteArrayDyn<'_, T>>,
+) -> PyResult<Option<&'a mut [T]>> {
+    let slice = array.as_mut().map(|a| a.as_slice_mut()).transpose();
+    slice.map_err(|_| mistake("an image array is not C-contiguous"))
+}
+
+fn outcome_codes(
+    py: Python<'_>,
+    outcomes: Vec<Result<AdvanceOutcome, AgentError>>,
+) -> PyResult<Bound<'_, PyArray1<u8>>> {
+    let code = |outcome| if outcome == AdvanceOutcome::NeedsAction { NEEDS_ACTION } else { ENDED };
+    let codes: Result<Vec<u8>, _> = outcomes.into_iter().map(|outcome| outcome.map(code)).collect();
+    Ok(PyArray1::from_vec(py, codes.map_err(failure)?))
+}
 
 #[pymethods]
 impl Batch {
@@ -107,11 +140,24 @@ impl Batch {
     fn advance<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u8>>> {
         let envs = self.envs()?;
         let outcomes = detached(py, || envs.advance(None))?;
-        let code =
-            |outcome| if outcome == AdvanceOutcome::NeedsAction { NEEDS_ACTION } else { ENDED };
-        let codes: Result<Vec<u8>, _> =
-            outcomes.into_iter().map(|outcome| outcome.map(code)).collect();
-        Ok(PyArray1::from_vec(py, codes.map_err(failure)?))
+        outcome_codes(py, outcomes)
+    }
+
+    /// Advances and observes in one pass, which is faster: `advance`, then `observe` of the slots that have not been
+    /// observed in this turn. Returns the outcomes as `advance` does. Pass the same arrays each time.
+    #[pyo3(signature = (rgb=None, depth=None, ids=None))]
+    fn advance_and_observe<'py>(
+        &mut self,
+        py: Python<'py>,
+        rgb: Option<PyReadwriteArrayDyn<'_, u8>>,
+        depth: Option<PyReadwriteArrayDyn<'_, f32>>,
+        ids: Option<PyReadwriteArrayDyn<'_, u16>>,
+    ) -> PyResult<Bound<'py, PyArray1<u8>>> {
+        let mut arrays = ImageArrays { rgb, depth, ids };
+        let images = arrays.images()?;
+        let envs = self.envs()?;
+        let outcomes = detached(py, || envs.advance_and_observe(None, images))?;
+        outcome_codes(py, outcomes.map_err(|error| from_env(&error))?)
     }
 
     /// Renders the requested images of all slots that need an action into arrays: color (uint8 [slots, size, size,
@@ -121,20 +167,12 @@ impl Batch {
     fn observe(
         &mut self,
         py: Python<'_>,
-        mut rgb: Option<PyReadwriteArrayDyn<'_, u8>>,
-        mut depth: Option<PyReadwriteArrayDyn<'_, f32>>,
-        mut ids: Option<PyReadwriteArrayDyn<'_, u16>>,
+        rgb: Option<PyReadwriteArrayDyn<'_, u8>>,
+        depth: Option<PyReadwriteArrayDyn<'_, f32>>,
+        ids: Option<PyReadwriteArrayDyn<'_, u16>>,
     ) -> PyResult<Vec<usize>> {
-        let not_contiguous = |_| mistake("an image array is not C-contiguous");
-        let images = ImagesMut {
-            rgb: rgb.as_mut().map(|a| a.as_slice_mut()).transpose().map_err(not_contiguous)?,
-            depth_m: depth
-                .as_mut()
-                .map(|a| a.as_slice_mut())
-                .transpose()
-                .map_err(not_contiguous)?,
-            ids: ids.as_mut().map(|a| a.as_slice_mut()).transpose().map_err(not_contiguous)?,
-        };
+        let mut arrays = ImageArrays { rgb, depth, ids };
+        let images = arrays.images()?;
         let envs = self.envs()?;
         detached(py, || envs.observe(images))?.map_err(|error| from_env(&error))
     }

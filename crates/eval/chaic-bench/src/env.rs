@@ -92,7 +92,12 @@ impl EnvBench {
         let clock = Stopwatch::start();
         while fraction < 1.0 {
             let before: u64 = n_frames(&batch);
-            let outcomes = batch.advance(None);
+            let images = ImagesMut {
+                rgb: (n_rgb > 0).then_some(&mut rgb),
+                depth_m: (n_depth > 0).then_some(&mut depth_m),
+                ids: (n_ids > 0).then_some(&mut ids),
+            };
+            let outcomes = batch.advance_and_observe(None, images)?;
             frames += n_frames(&batch) - before;
             for (k, outcome) in outcomes.into_iter().enumerate() {
                 match outcome {
@@ -104,12 +109,7 @@ impl EnvBench {
                     Err(error) => return Err(EvalError::Options(error.to_string())),
                 }
             }
-            let buffers = ImagesMut {
-                rgb: (n_rgb > 0).then_some(&mut rgb),
-                depth_m: (n_depth > 0).then_some(&mut depth_m),
-                ids: (n_ids > 0).then_some(&mut ids),
-            };
-            for slot in batch.observe(buffers)? {
+            for slot in batch.waiting() {
                 batch.submit(slot, random_action(size, &mut rng));
                 steps += 1;
             }

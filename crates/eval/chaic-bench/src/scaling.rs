@@ -108,7 +108,7 @@ impl ScalingBench {
     fn measure_here(&self, progress: &mut dyn FnMut(f32)) -> Result<ScalingEstimate> {
         let (times, image_bytes) = self.step_times(progress)?;
         let envs = times.len();
-        let mut each: Vec<f64> = times.iter().flatten().map(StepTime::total).collect();
+        let mut each: Vec<f64> = times.iter().flatten().copied().collect();
         each.sort_by(f64::total_cmp);
         let (Some(max), n) = (each.last(), each.len()) else {
             return Err(EvalError::Options("there are no environments".to_owned()));
@@ -136,9 +136,9 @@ impl ScalingBench {
         })
     }
 
-    /// Returns the times of each environment's steps, and the size of a decision's images. All
-    /// environments have the same number of steps.
-    fn step_times(&self, progress: &mut dyn FnMut(f32)) -> Result<(Vec<Vec<StepTime>>, usize)> {
+    /// Returns the times of each environment's steps in seconds, and the size of a decision's images.
+    /// All environments have the same number of steps.
+    fn step_times(&self, progress: &mut dyn FnMut(f32)) -> Result<(Vec<Vec<f64>>, usize)> {
         let bundled = self.setup.episodes()?;
         let batch = |k: usize| Ok(EnvBatch::new(vec![self.setup.env(&bundled, k)?])?);
         let mut batches = (0..self.setup.envs).map(batch).collect::<Result<Vec<EnvBatch>>>()?;
@@ -146,13 +146,21 @@ impl ScalingBench {
         let [n_rgb, n_depth, n_ids] = lengths;
         let (mut rgb, mut depth_m, mut ids) = (vec![0; n_rgb], vec![0.0; n_depth], vec![0; n_ids]);
         let mut rng = RngStream::new(0, "bench env", 0);
-        let mut times: Vec<Vec<StepTime>> = vec![Vec::new(); batches.len()];
+        let mut times: Vec<Vec<f64>> = vec![Vec::new(); batches.len()];
         let (mut n_ended, mut fraction) = (0, 0.0);
         let start = Instant::now();
         while fraction < 1.0 {
             for (batch, times) in batches.iter_mut().zip(&mut times) {
                 let begun = Instant::now();
-                while let Some(outcome) = batch.advance(None).pop() {
+                loop {
+                    let images = ImagesMut {
+                        rgb: (n_rgb > 0).then_some(&mut rgb),
+                        depth_m: (n_depth > 0).then_some(&mut depth_m),
+                        ids: (n_ids > 0).then_some(&mut ids),
+                    };
+                    let outcomes = batch.advance_and_observe(None, images)?;
+                    let outcome =
+                        outcomes.into_iter().next().expect("the batch has one environment");
                     match outcome.map_err(|error| EvalError::Options(error.to_string()))? {
                         AdvanceOutcome::NeedsAction => break,
                         AdvanceOutcome::Ended | AdvanceOutcome::Stopped => {
@@ -162,19 +170,10 @@ impl ScalingBench {
                         }
                     }
                 }
-                let advanced = Instant::now();
-                let buffers = ImagesMut {
-                    rgb: (n_rgb > 0).then_some(&mut rgb),
-                    depth_m: (n_depth > 0).then_some(&mut depth_m),
-                    ids: (n_ids > 0).then_some(&mut ids),
-                };
-                for slot in batch.observe(buffers)? {
+                for slot in batch.waiting() {
                     batch.submit(slot, random_action(self.setup.size, &mut rng));
                 }
-                times.push(StepTime {
-                    advance_s: (advanced - begun).as_secs_f64(),
-                    observe_s: advanced.elapsed().as_secs_f64(),
-                });
+                times.push(begun.elapsed().as_secs_f64());
             }
             fraction = start.elapsed().as_secs_f32() / self.seconds;
             progress(fraction.min(1.0));
@@ -184,34 +183,15 @@ impl ScalingBench {
     }
 }
 
-/// Times of one step of one environment on one thread.
-#[derive(Clone, Copy, Debug)]
-struct StepTime {
-    /// Simulation until the helper's next decision, partner included, seconds.
-    advance_s: f64,
-    /// The helper's images, seconds.
-    observe_s: f64,
-}
-
-impl StepTime {
-    fn total(&self) -> f64 {
-        self.advance_s + self.observe_s
-    }
-}
-
-/// Decisions per second of a batch on many cores, with measured times `[env][step]`. All environments
-/// advance before any of them renders, as in `EnvBatch`.
-fn batch_speed(times: &[Vec<StepTime>], copies: usize, cores: usize) -> f64 {
+/// Decisions per second of a batch on many cores, with measured times `[env][step]` in seconds.
+fn batch_speed(times: &[Vec<f64>], copies: usize, cores: usize) -> f64 {
     let n_steps = times.first().map_or(0, Vec::len);
     let mut seconds = 0.0;
     for step in 0..n_steps {
-        let tasks = || {
-            (0..copies).flat_map(move |copy| {
-                times.iter().map(move |env| env[(step + copy * COPY_SHIFT) % n_steps])
-            })
-        };
-        seconds += makespan(tasks().map(|time| time.advance_s), cores);
-        seconds += makespan(tasks().map(|time| time.observe_s), cores);
+        let tasks = (0..copies).flat_map(|copy| {
+            times.iter().map(move |env| env[(step + copy * COPY_SHIFT) % n_steps])
+        });
+        seconds += makespan(tasks, cores);
     }
     (times.len() * copies * n_steps) as f64 / seconds
 }
@@ -267,8 +247,7 @@ mod tests {
 
     #[test]
     fn a_batch_waits_for_its_slowest_environment() {
-        let step = |advance_s: f64| StepTime { advance_s, observe_s: 0.0 };
-        let times = [vec![step(1.0); 4], vec![step(1.0); 4], vec![step(8.0); 4]];
+        let times = [vec![1.0; 4], vec![1.0; 4], vec![8.0; 4]];
         assert!((batch_speed(&times, 1, 1) - 0.3).abs() < 1e-12);
         assert!((batch_speed(&times, 1, 64) - 3.0 / 8.0).abs() < 1e-12);
     }

@@ -89,9 +89,32 @@ impl Buffers {
     }
 }
 
+/// Methods that advance a batch and observe its agents.
+#[derive(Clone, Copy)]
+enum Passes {
+    One,
+    Two,
+}
+
+impl Passes {
+    /// Advances and observes; returns the waiting slots.
+    fn run(self, batch: &mut EnvBatch, buffers: &mut Buffers) -> Vec<usize> {
+        let outcomes = match self {
+            Passes::One => batch.advance_and_observe(None, buffers.images_mut()),
+            Passes::Two => Ok(batch.advance(None)),
+        };
+        let outcomes = outcomes.expect("the buffers fit");
+        assert!(outcomes.iter().all(|outcome| *outcome == Ok(AdvanceOutcome::NeedsAction)));
+        match self {
+            Passes::One => batch.waiting(),
+            Passes::Two => batch.observe(buffers.images_mut()).expect("the buffers fit"),
+        }
+    }
+}
+
 /// Runs the environments of these numbers in one batch; returns a digest of observations and final
 /// state for each.
-fn run_batch(bundled: &[Episode], numbers: &[usize]) -> BTreeMap<usize, u64> {
+fn run_batch(bundled: &[Episode], numbers: &[usize], passes: Passes) -> BTreeMap<usize, u64> {
     let envs = numbers.iter().map(|n| env(bundled, *n, Grants::IDS, ALL)).collect();
     let mut batch = EnvBatch::new(envs).expect("the sensors are equal");
     let mut buffers = Buffers::new(batch.layout());
@@ -99,8 +122,7 @@ fn run_batch(bundled: &[Episode], numbers: &[usize]) -> BTreeMap<usize, u64> {
     let mut rngs: Vec<RngStream> = numbers.iter().map(rng).collect();
     let mut digests: Vec<Xxh3> = numbers.iter().map(|_| Xxh3::new()).collect();
     for _ in 0..N_DECISIONS {
-        assert!(batch.advance(None).iter().all(|flow| *flow == Ok(AdvanceOutcome::NeedsAction)));
-        for slot in batch.observe(buffers.images_mut()).expect("the buffers fit") {
+        for slot in passes.run(&mut batch, &mut buffers) {
             let observation = batch.observation(slot).expect("the agent waits");
             digests[slot].update(
                 format!("{:?} {:?}", observation.proprioception, observation.granted).as_bytes(),
@@ -120,16 +142,33 @@ fn batch_size_and_position_change_nothing() {
     let bundled = bundled();
     let mut alone = BTreeMap::new();
     for number in 0..7 {
-        alone.extend(run_batch(&bundled, &[number]));
+        alone.extend(run_batch(&bundled, &[number], Passes::Two));
     }
     let different: std::collections::BTreeSet<_> = alone.values().collect();
     assert_eq!(different.len(), 7, "the environments differ");
-    for size in [7, 64, 1024] {
+    for (size, passes) in [(7, Passes::Two), (64, Passes::One), (1024, Passes::Two)] {
         let numbers: Vec<usize> = (0..size).rev().collect();
-        let mut together = run_batch(&bundled, &numbers);
+        let mut together = run_batch(&bundled, &numbers, passes);
         together.retain(|number, _| *number < 7);
         assert_eq!(together, alone, "{size} environments");
     }
+}
+
+/// A second pass leaves the images and observations of the same turn.
+#[test]
+fn one_pass_observes_each_turn_once() {
+    let bundled = bundled();
+    let envs = (0..2).map(|n| env(&bundled, n, Grants::IDS, ALL)).collect();
+    let mut batch = EnvBatch::new(envs).unwrap();
+    let mut buffers = Buffers::new(batch.layout());
+    Passes::One.run(&mut batch, &mut buffers);
+    assert!(batch.submit(0, Action::TurnLeft));
+    buffers.depth_m.fill(-1.0);
+    assert_eq!(Passes::One.run(&mut batch, &mut buffers), [0, 1]);
+    let (first, second) = buffers.depth_m.split_at((SIZE * SIZE) as usize);
+    assert!(first.iter().all(|depth| *depth >= 0.0), "a new turn");
+    assert!(second.iter().all(|depth| *depth == -1.0), "the same turn");
+    assert!(batch.observation(1).is_some());
 }
 
 #[test]

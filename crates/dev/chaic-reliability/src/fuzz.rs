@@ -194,7 +194,7 @@ fn parse(
     input: &[u8],
     current: &Mutex<Current>,
 ) -> Result<String, String> {
-    let set = |began| {
+    let set = |began: Option<Instant>| {
         let mut current = current.lock().unwrap_or_else(PoisonError::into_inner);
         if began.is_some() {
             current.input = input.to_vec();

@@ -23,7 +23,7 @@ const MAX_KILLS: usize = 3;
 #[derive(Args)]
 pub struct KillOptions {
     /// Names of scenarios.
-    #[arg(default_values = ["run", "train"])]
+    #[arg(default_values = ["run", "long-train"])]
     scenarios: Vec<String>,
     /// Number of kills per scenario, 1 to 1000000.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]

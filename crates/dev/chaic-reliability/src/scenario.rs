@@ -17,8 +17,8 @@ pub enum Step {
     Run(&'static str),
     /// Shortens the episodes in a folder to [`FRAMES`].
     Shorten(&'static str),
-    /// Writes the configuration of a short training.
-    TrainingConfig(&'static str),
+    /// Writes the configuration `c.toml` of a training with this number of steps.
+    TrainingConfig(u64),
 }
 
 /// Way to complete an interrupted command.
@@ -50,6 +50,8 @@ pub struct Reader {
 pub struct Scenario {
     /// Name for the command line.
     pub name: &'static str,
+    /// True if it takes seconds; it runs only if it is named.
+    pub is_long: bool,
     /// Preparation in an empty folder.
     pub steps: &'static [Step],
     /// Arguments of the command.
@@ -62,17 +64,19 @@ pub struct Scenario {
     pub readers: &'static [Reader],
 }
 
-const HOUSE: Step = Step::Run("episodes generate --task no_constraint --seeds 0..1 --out e");
-const STREET: Step = Step::Run("episodes generate --task shopping --seeds 0..1 --out e");
-/// Steps that generate episodes in `e`.
-pub const GENERATE_STEPS: [Step; 2] = [HOUSE, STREET];
-/// Steps that generate short episodes in `e`.
-pub const EPISODE_STEPS: [Step; 3] = [HOUSE, STREET, Step::Shorten("e")];
-/// Arguments that play them in `run`.
+/// Step that generates an episode in `e`.
+pub const GENERATE: Step = Step::Run("episodes generate --task shopping --seeds 0..1 --out e");
+/// Steps that generate a short episode in `e`.
+pub const EPISODE_STEPS: [Step; 2] = [GENERATE, Step::Shorten("e")];
+/// Arguments that play it in `run`.
 pub const PLAY: &str = "eval --episodes e --helper none,rhp --size 16 --jobs 1 --out run";
-const PLAYED: [Step; 4] = [HOUSE, STREET, Step::Shorten("e"), Step::Run(PLAY)];
+const PLAYED: [Step; 3] = [GENERATE, Step::Shorten("e"), Step::Run(PLAY)];
 const RESUME_RUN: Recovery =
     Recovery::Resume { marker: "run/run.json", command: "eval --resume --jobs 1 --out run" };
+const COLLECT: Step =
+    Step::Run("collect opponent --out w --of-each 20 --episodes 1 --image-size 32");
+const RESUME_TRAINING: Recovery =
+    Recovery::Resume { marker: "t/config.toml", command: "train opponent --resume --out t" };
 /// Readers of an unfinished run accept what is finished.
 const RUN_READERS: [Reader; 2] = [
     Reader { command: "verify run", is_exact: false },
@@ -80,9 +84,10 @@ const RUN_READERS: [Reader; 2] = [
 ];
 
 /// All scenarios.
-pub const SCENARIOS: [Scenario; 9] = [
+pub const SCENARIOS: [Scenario; 10] = [
     Scenario {
         name: "run",
+        is_long: false,
         steps: &EPISODE_STEPS,
         command: PLAY,
         outputs: &["run"],
@@ -91,9 +96,9 @@ pub const SCENARIOS: [Scenario; 9] = [
     },
     Scenario {
         name: "resume",
+        is_long: false,
         steps: &[
-            HOUSE,
-            STREET,
+            GENERATE,
             Step::Shorten("e"),
             Step::Run(
                 "eval --episodes e --helper none,rhp --size 16 --jobs 1 --shard 1/2 --out run",
@@ -106,9 +111,9 @@ pub const SCENARIOS: [Scenario; 9] = [
     },
     Scenario {
         name: "merge",
+        is_long: false,
         steps: &[
-            HOUSE,
-            STREET,
+            GENERATE,
             Step::Shorten("e"),
             Step::Run("eval --episodes e --helper none,rhp --size 16 --jobs 1 --shard 1/2 --out a"),
             Step::Run("eval --episodes e --helper none,rhp --size 16 --jobs 1 --shard 2/2 --out b"),
@@ -123,6 +128,7 @@ pub const SCENARIOS: [Scenario; 9] = [
     },
     Scenario {
         name: "report",
+        is_long: false,
         steps: &PLAYED,
         command: "report run --figure f.png",
         outputs: &["f.png"],
@@ -131,14 +137,16 @@ pub const SCENARIOS: [Scenario; 9] = [
     },
     Scenario {
         name: "replay",
+        is_long: false,
         steps: &PLAYED,
-        command: "replay run/traces/shopping/rhp/shopping-gen-0-s0.jsonl --out r.gif --every 10",
+        command: "replay run shopping/gen/0 --out r.gif --every 10",
         outputs: &["r.gif"],
         recovery: Recovery::Repeat,
         readers: &[],
     },
     Scenario {
         name: "export",
+        is_long: false,
         steps: &PLAYED,
         command: "export lerobot run --out set --every 30 --size 32",
         outputs: &["set"],
@@ -147,20 +155,25 @@ pub const SCENARIOS: [Scenario; 9] = [
     },
     Scenario {
         name: "train",
-        steps: &[
-            Step::Run("collect opponent --out w --of-each 20 --episodes 1 --image-size 32"),
-            Step::TrainingConfig("c.toml"),
-        ],
+        is_long: false,
+        steps: &[COLLECT, Step::TrainingConfig(200)],
         command: "train opponent --config c.toml --out t",
         outputs: &["t"],
-        recovery: Recovery::Resume {
-            marker: "t/config.toml",
-            command: "train opponent --resume --out t",
-        },
+        recovery: RESUME_TRAINING,
+        readers: &[],
+    },
+    Scenario {
+        name: "long-train",
+        is_long: true,
+        steps: &[COLLECT, Step::TrainingConfig(3000)],
+        command: "train opponent --config c.toml --out t",
+        outputs: &["t"],
+        recovery: RESUME_TRAINING,
         readers: &[],
     },
     Scenario {
         name: "seal",
+        is_long: false,
         steps: &[Step::Run("episodes seal --secret s --task shopping --n-episodes 2 --out first")],
         command: "episodes seal --secret s --task shopping --n-episodes 2 --out sealed",
         outputs: &["sealed"],
@@ -172,6 +185,7 @@ pub const SCENARIOS: [Scenario; 9] = [
     },
     Scenario {
         name: "secret",
+        is_long: false,
         steps: &[],
         command: "episodes seal --secret s --task shopping --n-episodes 1 --out sealed",
         outputs: &[],
@@ -183,8 +197,8 @@ pub const SCENARIOS: [Scenario; 9] = [
     },
 ];
 
-/// Steps of the short training: two checkpoints and validations.
-const TRAINING: &str = "steps = 2000\nwarm_up = 1\nbatch_size = 8\nvalidation_max_per_class = 5\n\
+/// Configuration of a fast training.
+const TRAINING: &str = "warm_up = 1\nbatch_size = 1\nvalidation_max_per_class = 5\n\
                         windows = \"w\"\n[collect]\nepisodes = 1\nimage_size = 32\n";
 
 /// Prepares inputs in an empty folder.
@@ -196,7 +210,9 @@ pub fn prepare(steps: &[Step], folder: &Path) -> Result<()> {
         match step {
             Step::Run(command) => drop(run_ok(folder, &words(command))?),
             Step::Shorten(episodes) => shorten(&folder.join(episodes), FRAMES)?,
-            Step::TrainingConfig(name) => fs::write(folder.join(name), TRAINING)?,
+            Step::TrainingConfig(steps) => {
+                fs::write(folder.join("c.toml"), format!("steps = {steps}\n{TRAINING}"))?;
+            }
         }
     }
     Ok(())
@@ -223,7 +239,7 @@ pub fn shorten(folder: &Path, frames: u32) -> Result<()> {
     Ok(())
 }
 
-/// Returns the scenarios of these names; all of them for an empty list.
+/// Returns the scenarios of these names; all short ones for an empty list.
 ///
 /// # Errors
 /// If a name is unknown.
@@ -232,5 +248,9 @@ pub fn select(names: &[String]) -> Result<Vec<&'static Scenario>> {
         let known: Vec<&str> = SCENARIOS.iter().map(|s| s.name).collect();
         bail!("no scenario `{unknown}`; the scenarios are {}", known.join(", "));
     }
-    Ok(SCENARIOS.iter().filter(|s| names.is_empty() || names.iter().any(|n| n == s.name)).collect())
+    let is_selected = |s: &&Scenario| match names {
+        [] => !s.is_long,
+        names => names.iter().any(|name| name == s.name),
+    };
+    Ok(SCENARIOS.iter().filter(is_selected).collect())
 }

@@ -10,7 +10,7 @@ use chaic_sandbox::Launcher;
 use clap::Args;
 
 use crate::process_status::{descriptors, memory_kib, threads};
-use crate::scenario::{GENERATE_STEPS, prepare, shorten, words};
+use crate::scenario::{GENERATE, prepare, shorten, words};
 
 /// Largest growth of memory in the second half, per cent.
 const MAX_GROWTH_PERCENT: f64 = 5.0;
@@ -20,8 +20,8 @@ const PERIOD: Duration = Duration::from_millis(200);
 /// Options of `soak`.
 #[derive(Args)]
 pub struct SoakOptions {
-    /// Number of episode runs, 40 to 40000: half of them without a helper and half with RHP.
-    #[arg(long, default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(40..=40_000))]
+    /// Number of episode runs, 40 to 20000: half of them without a helper and half with RHP.
+    #[arg(long, default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(40..=20_000))]
     episodes: u32,
     /// Duration of an episode in frames, 1 to 3000.
     #[arg(long, default_value_t = 300, value_parser = clap::value_parser!(u32).range(1..=3000))]
@@ -43,11 +43,11 @@ struct Sample {
 /// If the run fails.
 pub fn run(options: &SoakOptions) -> Result<bool> {
     let dir = tempfile::tempdir().context("no temporary folder")?;
-    prepare(&GENERATE_STEPS, dir.path())?;
+    prepare(&[GENERATE], dir.path())?;
     shorten(&dir.path().join("e"), options.frames)?;
     let journal = dir.path().join("run/results.jsonl");
     let began = Instant::now();
-    let (code, samples) = play(dir.path(), options.episodes.div_ceil(4), &journal);
+    let (code, samples) = play(dir.path(), options.episodes.div_ceil(2), &journal);
     anyhow::ensure!(code == 0, "the run ends with exit code {code}");
     let seconds = began.elapsed().as_secs_f64();
     println!("| episodes | memory, MiB | descriptors | threads |\n|--:|--:|--:|--:|");
@@ -69,7 +69,7 @@ pub fn run(options: &SoakOptions) -> Result<bool> {
         && is_constant(|sample| sample.threads))
 }
 
-/// Plays each of four episode runs with this number of seeds, in the folder `at`; returns the exit
+/// Plays each of two episode runs with this number of seeds, in the folder `at`; returns the exit
 /// code and samples by number of finished episodes.
 fn play(at: &Path, n_seeds: u32, journal: &Path) -> (u8, Vec<Sample>) {
     let path = |name: &str| at.join(name).into_os_string();

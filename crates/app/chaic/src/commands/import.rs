@@ -1,6 +1,6 @@
 //! `chaic import`.
 
-use anyhow::{Context as _, Result};
+use anyhow::Result;
 use chaic_files::{create_folders, write_atomically};
 use chaic_import::{Half, OnError, Sources, import};
 use serde_json::json;

@@ -44,7 +44,7 @@ impl Inputs {
         run_ok(folder, &words(PLAY))?;
         let scratch = folder.join("scratch");
         fs::create_dir(&scratch)?;
-        let copy = fs::read(folder.join("run/episodes/shopping-shopping-gen-0.json"))?;
+        let copy = fs::read(folder.join("run/episodes/shopping-gen-0.json"))?;
         let episode = Episode::parse(&copy, "the episode")?;
         run_ok(
             folder,
@@ -75,7 +75,7 @@ impl Inputs {
     /// # Errors
     /// If the run has none.
     pub fn trace(&self) -> Result<Vec<u8>> {
-        self.file("traces/shopping/rhp/shopping-gen-0-s0.jsonl")
+        self.file("traces/shopping/rhp/gen-0-s0.jsonl")
     }
 }
 
@@ -127,8 +127,9 @@ pub fn record() -> Vec<u8> {
     let exchange = Exchange::new(7, request(), Vec::new(), reply);
     let header = RecordHeader::new(&key, AgentId::HELPER, "m");
     let header = serde_json::to_string(&header).expect("a header serializes to JSON");
-    let entry = RecordEntry::Exchange(Box::new(exchange)).to_line();
-    format!("{header}\n{entry}{entry}").into_bytes()
+    let entry = RecordEntry::Exchange(Box::new(exchange));
+    let entry = serde_json::to_string(&entry).expect("an entry serializes to JSON");
+    format!("{header}\n{entry}\n{entry}\n").into_bytes()
 }
 
 /// Answers of a language model to a list of three plans.
@@ -171,7 +172,8 @@ pub fn request_frames() -> Result<Vec<u8>> {
     let briefing = env.briefing(AgentId::HELPER);
     env.advance(Some(1))?;
     let hello = RequestMessage::Hello { protocol: PROTOCOL, chaic: "0.1.0".to_owned() };
-    let mut frames = vec![head(&hello), head(&RequestMessage::Reset { briefing })];
+    let mut frames =
+        vec![head(&hello), head(&RequestMessage::Reset { briefing: Box::new(briefing) })];
     frames.extend(env.observe(AgentId::HELPER).map(observation_frame));
     frames.push(head(&RequestMessage::Bye));
     Ok(to_bytes(&frames))

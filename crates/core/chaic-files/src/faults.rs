@@ -1,7 +1,7 @@
 //! Injection of faults into file operations, for tests.
 //!
 //! A test program installs one [`FaultPlan`] for its process and then calls the code under test. The
-//! operations of the process are numbered from 0. No option, environment variable or feature
+//! operations on each path are numbered from 0, which does not depend on other threads. No option, environment variable or feature
 //! installs a plan, so a user cannot do so by accident.
 //!
 //! **Limits**: a power failure keeps all finished renames, removals and new folders, as a journaling
@@ -76,10 +76,12 @@ pub enum FaultKind {
 }
 
 /// A fault and the operation at which it occurs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FaultPlan {
-    /// Number of the operation, from 0.
-    pub index: u64,
+    /// The file or folder that the operation changes, as in [`OperationRecord::path`].
+    pub path: PathBuf,
+    /// Number of the operation among those on this path, from 0.
+    pub index: usize,
     /// Kind of the fault.
     pub kind: FaultKind,
 }
@@ -157,6 +159,8 @@ struct Injector {
 #[derive(Default)]
 struct State {
     operations: Vec<OperationRecord>,
+    /// True once the disk is full.
+    is_full: bool,
     /// Flushed length of each file with bytes that were not flushed.
     flushed_len: BTreeMap<PathBuf, u64>,
 }
@@ -257,14 +261,15 @@ impl Injector {
         action: impl FnOnce(&mut State, Option<FaultKind>) -> io::Result<T>,
     ) -> io::Result<T> {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        let index = state.operations.len() as u64;
+        let index = state.operations.iter().filter(|record| record.path == path).count();
         state.operations.push(OperationRecord { operation, path: path.to_owned() });
-        let is_now = |plan: &FaultPlan| match plan.kind {
-            FaultKind::NoSpace => index >= plan.index,
-            _ => index == plan.index,
-        };
-        let plan = self.plan.filter(|plan| is_now(plan) && plan.kind.applies_to(operation));
-        let fault = plan.map(|plan| plan.kind);
+        let is_now = |plan: &&FaultPlan| plan.path == path && plan.index == index;
+        let mut fault = self.plan.as_ref().filter(is_now).map(|plan| plan.kind);
+        state.is_full |= fault == Some(FaultKind::NoSpace);
+        if state.is_full {
+            fault = Some(FaultKind::NoSpace);
+        }
+        let fault = fault.filter(|kind| kind.applies_to(operation));
         match fault {
             Some(FaultKind::NoSpace) => return Err(io::Error::from_raw_os_error(NO_SPACE)),
             Some(FaultKind::IoError) => return Err(io::Error::from_raw_os_error(IO_ERROR)),

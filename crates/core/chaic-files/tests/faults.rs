@@ -14,7 +14,8 @@ fn a_write_that_fails_leaves_the_old_file_and_the_next_one_succeeds() {
     assert!(operations().is_empty(), "nothing is recorded without a plan");
 
     // Operations of a write: open, write, flush, rename.
-    assert!(install(Some(FaultPlan { index: 2, kind: FaultKind::IoError })));
+    let temporary = folder.path().join("a.txt.tmp");
+    assert!(install(Some(FaultPlan { path: temporary, index: 2, kind: FaultKind::IoError })));
     let error = write_atomically(&path, b"new").expect_err("the flush fails");
     assert!(error.to_string().starts_with("can't write"), "{error}");
     assert_eq!(fs::read(&path).expect("the old file"), b"old");

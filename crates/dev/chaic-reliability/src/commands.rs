@@ -1,5 +1,6 @@
 //! Runs of the command `chaic` in processes of their own, with or without a fault.
 
+use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -37,12 +38,12 @@ impl Ended {
 }
 
 /// Returns the command line of this program as `chaic`, in a folder.
-pub fn chaic(folder: &Path, fault: Option<FaultPlan>, log: Option<&Path>) -> Result<Command> {
+pub fn chaic(folder: &Path, fault: Option<&FaultPlan>, log: Option<&Path>) -> Result<Command> {
     let program = std::env::current_exe().context("can't find this program")?;
     let mut command = Command::new(program);
     command.current_dir(folder).stdin(Stdio::null()).arg("chaic");
-    if let Some(FaultPlan { index, kind }) = fault {
-        command.args(["--fault", kind.name(), "--at", &index.to_string()]);
+    if let Some(FaultPlan { path, index, kind }) = fault {
+        command.args(["--fault", kind.name(), "--at", &index.to_string()]).arg("--path").arg(path);
     }
     if let Some(log) = log {
         command.arg("--log").arg(log);
@@ -55,7 +56,7 @@ pub fn chaic(folder: &Path, fault: Option<FaultPlan>, log: Option<&Path>) -> Res
 ///
 /// # Errors
 /// If the process cannot be started.
-pub fn run(folder: &Path, arguments: &[&str], fault: Option<FaultPlan>) -> Result<Ended> {
+pub fn run(folder: &Path, arguments: &[&str], fault: Option<&FaultPlan>) -> Result<Ended> {
     let output = chaic(folder, fault, None)?.args(arguments).output().context("can't start")?;
     let text = |bytes: Vec<u8>| String::from_utf8_lossy(&bytes).into_owned();
     let (stdout, stderr) = (text(output.stdout), text(output.stderr));
@@ -75,29 +76,47 @@ pub fn run_ok(folder: &Path, arguments: &[&str]) -> Result<Ended> {
     Ok(ended)
 }
 
-/// Runs `chaic` in a folder, and returns the kinds of its file operations.
+/// File operation of a command.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct FileOperation {
+    /// The file or folder that it changes.
+    pub path: String,
+    /// Number among the operations on this path, from 0.
+    pub index: usize,
+    /// Name of its kind.
+    pub kind: String,
+}
+
+/// Runs `chaic` in a folder, and returns its file operations, sorted: threads may change their order.
 ///
 /// # Errors
 /// If it fails.
-pub fn operations(folder: &Path, arguments: &[&str], log: &Path) -> Result<Vec<String>> {
+pub fn operations(folder: &Path, arguments: &[&str], log: &Path) -> Result<Vec<FileOperation>> {
     let output = chaic(folder, None, Some(log))?.args(arguments).output().context("can't start")?;
     if !output.status.success() {
         let stderr = String::from_utf8_lossy(&output.stderr);
         bail!("`chaic {}` without faults: {}", arguments.join(" "), stderr.trim());
     }
     let text = std::fs::read_to_string(log).context("can't read the list of operations")?;
-    Ok(text.lines().map(str::to_owned).collect())
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut found = Vec::new();
+    for (kind, path) in text.lines().filter_map(|line| line.split_once('\t')) {
+        let count = counts.entry(path).or_default();
+        found.push(FileOperation { path: path.to_owned(), index: *count, kind: kind.to_owned() });
+        *count += 1;
+    }
+    found.sort();
+    Ok(found)
 }
 
 /// Plays the command `chaic` in this process, with a fault.
 pub fn run_chaic(
-    fault: Option<FaultKind>,
-    at: u64,
+    fault: Option<FaultPlan>,
     log: Option<&Path>,
     arguments: Vec<OsString>,
 ) -> ExitCode {
     if fault.is_some() || log.is_some() {
-        faults::install(fault.map(|kind| FaultPlan { index: at, kind }));
+        faults::install(fault);
     }
     let arguments = std::iter::once("chaic".into()).chain(arguments);
     let code = chaic::run(arguments, &Launcher::this_program());
@@ -114,8 +133,10 @@ pub fn run_chaic(
     ExitCode::from(code)
 }
 
-/// Returns whether a fault applies to an operation of [`operations`].
-pub fn applies(kind: FaultKind, operation: &str) -> bool {
-    let name = operation.split('\t').next().unwrap_or_default();
-    Operation::ALL.into_iter().any(|o| format!("{o:?}") == name && kind.applies_to(o))
+impl FileOperation {
+    /// Returns whether the operation can fail in this way.
+    pub fn can_fail(&self, kind: FaultKind) -> bool {
+        let is_named = |o: &Operation| format!("{o:?}") == self.kind;
+        Operation::ALL.into_iter().find(is_named).is_some_and(|o| kind.applies_to(o))
+    }
 }

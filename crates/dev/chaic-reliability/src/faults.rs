@@ -14,7 +14,7 @@ use anyhow::{Context as _, Result};
 use chaic_files::faults::{CRASHED, FaultKind, FaultPlan};
 use clap::Args;
 
-use crate::commands::{Ended, applies, run};
+use crate::commands::{Ended, FileOperation, run};
 use crate::folder::{contents, copy, differences};
 use crate::scenario::{prepare, select, words};
 use crate::trial::Trial;
@@ -70,10 +70,11 @@ pub fn run_all(options: &FaultOptions) -> Result<bool> {
 }
 
 /// Returns the faults of all operations.
-fn cases(operations: &[String], kinds: &[FaultKind], every: usize) -> Vec<FaultPlan> {
-    let faults = operations.iter().enumerate().flat_map(|(index, operation)| {
-        let kinds = kinds.iter().filter(|kind| applies(**kind, operation));
-        kinds.map(move |kind| FaultPlan { index: index as u64, kind: *kind })
+fn cases(operations: &[FileOperation], kinds: &[FaultKind], every: usize) -> Vec<FaultPlan> {
+    let faults = operations.iter().flat_map(|operation| {
+        let kinds = kinds.iter().filter(|kind| operation.can_fail(**kind));
+        let FileOperation { path, index, .. } = operation;
+        kinds.map(|kind| FaultPlan { path: path.into(), index: *index, kind: *kind })
     });
     faults.step_by(every).collect()
 }
@@ -89,14 +90,10 @@ fn run_cases(
     let work = &|worker: usize| -> Result<()> {
         while let Some(fault) = cases.get(next.fetch_add(1, Ordering::Relaxed)) {
             let at = folder.join(format!("case-{worker}"));
-            if let Err(problem) = check(trial, *fault, &at) {
-                let FaultPlan { index, kind } = fault;
-                let operation = trial.operations[*index as usize].replace('\t', " ");
-                let line = format!(
-                    "{}: {} at operation {index} ({operation}): {problem:#}",
-                    trial.scenario.name,
-                    kind.name()
-                );
+            if let Err(problem) = check(trial, fault, &at) {
+                let FaultPlan { path, index, kind } = fault;
+                let (name, kind, path) = (trial.scenario.name, kind.name(), path.display());
+                let line = format!("{name}: {kind} at operation {index} on {path}: {problem:#}");
                 failures.lock().expect("no worker panics").push(line);
             }
             std::fs::remove_dir_all(&at)?;
@@ -111,17 +108,17 @@ fn run_cases(
 }
 
 /// Runs the command with a fault in the folder `at`, and checks the promises of this module.
-fn check(trial: &Trial<'_>, fault: FaultPlan, at: &Path) -> Result<()> {
+fn check(trial: &Trial<'_>, fault: &FaultPlan, at: &Path) -> Result<()> {
     copy(trial.inputs, at)?;
     let ended = run(at, &words(trial.scenario.command), Some(fault))?;
-    check_end(trial, fault, &ended, at).context("the command")?;
+    check_end(trial, fault.kind, &ended, at).context("the command")?;
     trial.check_readers(at)?;
     trial.complete(at)
 }
 
 /// Checks the end of the command with the fault.
-fn check_end(trial: &Trial<'_>, fault: FaultPlan, ended: &Ended, at: &Path) -> Result<()> {
-    if fault.kind.ends_process() {
+fn check_end(trial: &Trial<'_>, fault: FaultKind, ended: &Ended, at: &Path) -> Result<()> {
+    if fault.ends_process() {
         let code = ended.code;
         anyhow::ensure!(code == Some(CRASHED), "exit code {code:?} instead of a crash");
         return Ok(());
@@ -129,7 +126,7 @@ fn check_end(trial: &Trial<'_>, fault: FaultPlan, ended: &Ended, at: &Path) -> R
     if let Some(problem) = ended.problem() {
         anyhow::bail!(problem);
     }
-    if fault.kind == FaultKind::ShortWrite {
+    if fault == FaultKind::ShortWrite {
         anyhow::ensure!(
             ended.code == Some(0),
             "a short write is an error: {}",

@@ -17,7 +17,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Result;
-use chaic_files::faults::FaultKind;
+use chaic_files::faults::{FaultKind, FaultPlan};
 use clap::{Parser, Subcommand};
 
 use crate::faults::FaultOptions;
@@ -46,11 +46,14 @@ enum Command {
     #[command(hide = true)]
     Chaic {
         /// Kind of the fault.
-        #[arg(long, requires = "at")]
+        #[arg(long, requires = "path")]
         fault: Option<FaultKind>,
-        /// Number of the operation that fails, 0 to 1000000000.
-        #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=1_000_000_000))]
-        at: u64,
+        /// File or folder of the operation that fails.
+        #[arg(long, default_value = "")]
+        path: PathBuf,
+        /// Number of the operation among those on this path, 0 to 1000000000.
+        #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=1_000_000_000))]
+        at: u32,
         /// File that gets a line for each file operation.
         #[arg(long)]
         log: Option<PathBuf>,
@@ -66,8 +69,9 @@ fn main() -> ExitCode {
         Command::Kills(options) => kills::run_all(&options),
         Command::Soak(options) => soak::run(&options),
         Command::Fuzz(options) => fuzz::run_all(&options),
-        Command::Chaic { fault, at, log, arguments } => {
-            return commands::run_chaic(fault, at, log.as_deref(), arguments);
+        Command::Chaic { fault, path, at, log, arguments } => {
+            let fault = fault.map(|kind| FaultPlan { path, index: at as usize, kind });
+            return commands::run_chaic(fault, log.as_deref(), arguments);
         }
     };
     exit_code(ended)

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context as _, Result};
 
-use crate::commands::{operations, run, run_ok};
+use crate::commands::{FileOperation, operations, run, run_ok};
 use crate::folder::{Contents, contents, copy, differences};
 use crate::scenario::{Recovery, Scenario, words};
 
@@ -14,8 +14,8 @@ pub struct Trial<'a> {
     pub scenario: &'a Scenario,
     /// Folder with the inputs.
     pub inputs: &'a Path,
-    /// Kinds of file operations of the command, in order.
-    pub operations: Vec<String>,
+    /// File operations of the command, sorted.
+    pub operations: Vec<FileOperation>,
     /// Files of the result.
     pub expected: Contents,
     /// Output of each reader of the complete result.

@@ -29,9 +29,9 @@ fn a_fault_ends_the_command_or_is_one_line() {
     let generate = ["episodes", "generate", "--task", "shopping", "--seeds", "0..1", "--out"];
     let run = |fault: &str| {
         let out = out.to_str().expect("the path is UTF-8");
-        reliability(
-            &[&["chaic", "--fault", fault, "--at", "2", "--"], &generate[..], &[out]].concat(),
-        )
+        let temporary = format!("{out}/shopping-0.json.tmp");
+        let plan = ["chaic", "--fault", fault, "--path", &temporary, "--at", "1", "--"];
+        reliability(&[&plan[..], &generate[..], &[out]].concat())
     };
     let crashed = run("crash-before");
     assert_eq!(crashed.status.code(), Some(86));
@@ -42,7 +42,8 @@ fn a_fault_ends_the_command_or_is_one_line() {
     assert!(error.starts_with("error: can't write") && error.lines().count() == 1, "{error}");
     let power = run("power-failure");
     assert_eq!(power.status.code(), Some(86));
-    assert!(!out.join("shopping-0.json").exists());
+    let temporary = std::fs::read(out.join("shopping-0.json.tmp")).expect("a file without content");
+    assert!(temporary.is_empty() && !out.join("shopping-0.json").exists());
 }
 
 #[test]

@@ -103,7 +103,7 @@ impl Client {
                 body.map_or(String::new(), |b| String::from_utf8_lossy(&b).into_owned());
             return Err(self.refusal(status, &description, retry_after, request).into());
         }
-        Ok(self.reply(request, body?, latency)?)
+        Ok(self.parse_reply(request, body?, latency)?)
     }
 
     /// Returns the request body.
@@ -189,8 +189,11 @@ impl Client {
         Failure { fault, is_retryable, retry_after }
     }
 
-    /// Parses the bytes of an answer.
-    fn reply(
+    /// Parses the bytes of an answer, as [`Client::send`] does.
+    ///
+    /// # Errors
+    /// If they are no chat completion.
+    pub fn parse_reply(
         &self,
         request: &ChatRequest,
         bytes: Vec<u8>,

@@ -3,13 +3,14 @@
 //! When an interrupted episode is played again, existing entries are reused as long as the requests
 //! are equal, so that no answered request is sent twice.
 
-use std::fs::File;
 use std::io::{Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
 use chaic_core::AgentId;
 use chaic_env::{RunKey, slug};
-use chaic_files::{EntryKind, create_folders_below, kind_below, open_or_create, read_below, walk};
+use chaic_files::{
+    EntryKind, OutputFile, create_folders_below, kind_below, open_or_create, read_below, walk,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{LlmError, Result};
@@ -147,7 +148,7 @@ fn parse(line: &[u8]) -> std::result::Result<RecordEntry, String> {
 #[derive(Debug)]
 pub struct DecisionLogWriter {
     path: PathBuf,
-    file: File,
+    file: OutputFile,
     /// Entries from before.
     before: DecisionLog,
     /// Number of these entries that were reused.
@@ -210,7 +211,8 @@ impl DecisionLogWriter {
             self.file.seek(SeekFrom::Start(end)).map_err(refused())?;
             self.before.entries.truncate(self.used);
         }
-        self.file.write_all(entry.to_line().as_bytes()).map_err(refused())
+        let written = self.file.write_all(entry.to_line().as_bytes());
+        written.and_then(|()| self.file.sync_data()).map_err(refused())
     }
 }
 

@@ -1,12 +1,13 @@
 //! State shared by all agents of a run: settings, templates, endpoint and budget.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, OnceLock};
 
 use chaic_env::CHAIC_VERSION;
-use chaic_files::{EntryKind, create_folders_below, kind_below, read_below, write_atomically};
+use chaic_files::{
+    EntryKind, create_folders, create_folders_below, kind_below, read_below, write_atomically,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::endpoint::Client;
@@ -96,7 +97,7 @@ impl Session {
     /// If they differ, or a file cannot be written.
     pub fn attach(&self, run: &Path) -> Result<()> {
         let folder = record::folder(run);
-        fs::create_dir_all(run).map_err(LlmError::io("create the folder", run))?;
+        create_folders(run)?;
         create_folders_below(run, &folder)?;
         let current = self.recorded();
         match read_recorded(run)? {

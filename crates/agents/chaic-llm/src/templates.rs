@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use chaic_files::{read_bounded, write_atomically};
+use chaic_files::{create_folders, read_bounded, write_atomically};
 use minijinja::syntax::SyntaxConfig;
 use minijinja::value::{Serde, Value};
 use minijinja::{Environment, UndefinedBehavior};
@@ -90,7 +90,7 @@ impl Templates {
     /// # Errors
     /// If a file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<()> {
-        fs::create_dir_all(folder).map_err(LlmError::io("create the folder", folder))?;
+        create_folders(folder)?;
         for (name, text) in &self.texts {
             let path = folder.join(name);
             write_atomically(&path, text.as_bytes())?;

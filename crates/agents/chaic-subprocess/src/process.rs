@@ -237,12 +237,26 @@ fn process_builder(command: &HelperProgram) -> std::process::Command {
             Isolation::Trusted => confinement.command(&script(command)),
             Isolation::Sandboxed(_) => confinement.command(&command.line),
         },
-        _ => {
-            let mut shell = std::process::Command::new("sh");
-            shell.arg("-c").arg(script(command));
-            shell
-        }
+        _ => shell(command),
     }
+}
+
+/// Returns the shell of this system with the command.
+#[cfg(not(windows))]
+fn shell(command: &HelperProgram) -> std::process::Command {
+    let mut shell = std::process::Command::new("sh");
+    shell.arg("-c").arg(script(command));
+    shell
+}
+
+/// Returns the shell of this system with the command, which has no memory limit.
+#[cfg(windows)]
+fn shell(command: &HelperProgram) -> std::process::Command {
+    use std::os::windows::process::CommandExt as _;
+    let mut shell = std::process::Command::new("cmd");
+    // With /s, `cmd` removes the outer quotes and reads the rest as it stands.
+    shell.args(["/d", "/s", "/c"]).raw_arg(format!("\"{}\"", command.line));
+    shell
 }
 
 /// Returns a shell script that runs the command with its memory limit per process.

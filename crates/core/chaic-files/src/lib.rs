@@ -7,13 +7,17 @@
 
 mod kind;
 mod open;
+mod output_file;
 
 pub use kind::{Entry, EntryKind, is_file_below, kind, kind_below, walk};
 pub use open::{
     create_folders_below, create_or_replace, open_file, open_for_append, open_or_create,
     read_below, read_bounded, read_user_file,
 };
+pub use output_file::OutputFile;
 
+mod change;
+pub mod faults;
 mod lock;
 
 use std::ffi::OsString;
@@ -21,7 +25,10 @@ use std::fs;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
+pub use change::{create_folders, remove_empty_folder, remove_file, remove_folder, rename};
 pub use lock::{FolderLock, LOCK, LockError};
+
+use crate::faults::perform_rename;
 
 /// A file operation that the operating system refused.
 #[derive(Debug, thiserror::Error)]
@@ -60,16 +67,38 @@ pub const TEMPORARY_SUFFIX: &str = ".tmp";
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     let temporary = with_suffix(path, TEMPORARY_SUFFIX);
     let write = || -> io::Result<()> {
-        let mut file = create_or_replace(&temporary)?;
-        file.write_all(bytes)?;
-        file.sync_all()?;
-        fs::rename(&temporary, path)
+        write_and_sync(create_or_replace(&temporary)?, bytes)?;
+        perform_rename(&temporary, path, || fs::rename(&temporary, path))
     };
     write().map_err(|error| {
         // If the removal fails too, the suffix marks the file as temporary.
-        let _ = fs::remove_file(&temporary);
+        let _ = remove_file(&temporary);
         FileError::context("write", path)(error)
     })
+}
+
+/// Writes a new file that only its owner may read, atomically. Other systems than Unix apply the
+/// permissions of the folder.
+///
+/// # Errors
+/// If a file or link of this name exists, or the file system refuses. The temporary file is then
+/// removed if possible.
+pub fn write_new_private(path: &Path, bytes: &[u8]) -> Result<()> {
+    let temporary = with_suffix(path, TEMPORARY_SUFFIX);
+    let write = || -> io::Result<()> {
+        write_and_sync(open::create_private(&temporary)?, bytes)?;
+        perform_rename(&temporary, path, || change::rename_new(&temporary, path))
+    };
+    write().map_err(|error| {
+        // If the removal fails too, the suffix marks the file as temporary.
+        let _ = remove_file(&temporary);
+        FileError::context("create", path)(error)
+    })
+}
+
+fn write_and_sync(mut file: OutputFile, bytes: &[u8]) -> io::Result<()> {
+    file.write_all(bytes)?;
+    file.sync_all()
 }
 
 /// Returns the entries of a folder, sorted by name.
@@ -107,5 +136,21 @@ mod tests {
         let error = write_atomically(&folder, b"third").unwrap_err().to_string();
         assert!(error.contains("can't write") && error.contains("folder"), "{error}");
         assert_eq!(entries(dir.path()).unwrap(), [path, folder]);
+    }
+
+    #[test]
+    fn a_private_file_is_new_and_complete() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("secret");
+        write_new_private(&path, b"first").unwrap();
+        let error = write_new_private(&path, b"second").unwrap_err();
+        assert_eq!(error.error.kind(), io::ErrorKind::AlreadyExists);
+        assert_eq!(fs::read(&path).unwrap(), b"first");
+        assert_eq!(entries(dir.path()).unwrap(), [path.clone()]);
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt as _;
+            assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
+        }
     }
 }

@@ -1,9 +1,9 @@
 //! Exclusive locks on folders.
 
-use std::fs::{File, TryLockError};
+use std::fs::TryLockError;
 use std::path::{Path, PathBuf};
 
-use crate::{FileError, open_or_create};
+use crate::{FileError, OutputFile, open_or_create};
 
 /// Name of the lock file in a locked folder.
 pub const LOCK: &str = ".lock";
@@ -14,7 +14,7 @@ pub const LOCK: &str = ".lock";
 /// behind.
 #[derive(Debug)]
 pub struct FolderLock {
-    _file: File,
+    _file: OutputFile,
 }
 
 /// A folder that cannot be locked.
@@ -37,7 +37,7 @@ impl FolderLock {
     pub fn acquire(folder: &Path) -> Result<FolderLock, LockError> {
         let path = folder.join(LOCK);
         let file = open_or_create(&path)?;
-        match file.try_lock() {
+        match file.as_file().try_lock() {
             Ok(()) => Ok(FolderLock { _file: file }),
             Err(TryLockError::WouldBlock) => Err(LockError::Held(folder.to_owned())),
             Err(TryLockError::Error(error)) => Err(FileError::context("lock", &path)(error).into()),

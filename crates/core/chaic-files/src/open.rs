@@ -7,8 +7,9 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Read as _};
 use std::path::Path;
 
+use crate::faults::{Operation, perform};
 use crate::kind::names_below;
-use crate::{EntryKind, FileError, Result, kind, kind_below};
+use crate::{EntryKind, FileError, OutputFile, Result, kind, kind_below};
 
 /// Reads at most the first `limit` bytes of a regular file that is not a link.
 ///
@@ -58,7 +59,7 @@ pub fn open_file(path: &Path) -> Result<File> {
 ///
 /// # Errors
 /// If it is a link or no regular file, or the file system refuses.
-pub fn open_for_append(path: &Path) -> Result<File> {
+pub fn open_for_append(path: &Path) -> Result<OutputFile> {
     open_to_write(path, File::options().append(true))
 }
 
@@ -66,17 +67,19 @@ pub fn open_for_append(path: &Path) -> Result<File> {
 ///
 /// # Errors
 /// If it is a link or no regular file, or the file system refuses.
-pub fn open_or_create(path: &Path) -> Result<File> {
+pub fn open_or_create(path: &Path) -> Result<OutputFile> {
     open_to_write(path, File::options().read(true).write(true).truncate(false))
 }
 
-fn open_to_write(path: &Path, options: &mut OpenOptions) -> Result<File> {
+fn open_to_write(path: &Path, options: &mut OpenOptions) -> Result<OutputFile> {
     let found = kind(path)?;
     if found != EntryKind::Missing {
         check_regular(path, found)?;
     }
-    let file = without_blocking(options, true).create(true).open(path);
-    check_opened(file.map_err(FileError::context("open", path))?, path)
+    let options = without_blocking(options, true).create(true);
+    let file = perform(Operation::Open, path, || options.open(path));
+    let file = check_opened(file.map_err(FileError::context("open", path))?, path)?;
+    Ok(OutputFile::new(file, path))
 }
 
 /// Creates an empty file and replaces an existing file or link of this name. Links are not
@@ -84,13 +87,29 @@ fn open_to_write(path: &Path, options: &mut OpenOptions) -> Result<File> {
 ///
 /// # Errors
 /// If a folder has this name, or the file system refuses.
-pub fn create_or_replace(path: &Path) -> io::Result<File> {
-    match fs::remove_file(path) {
-        Err(e) if e.kind() != ErrorKind::NotFound => return Err(e),
-        _ => {}
+pub fn create_or_replace(path: &Path) -> io::Result<OutputFile> {
+    create(path, File::options().write(true))
+}
+
+/// Creates an empty file like [`create_or_replace`], which only its owner may read.
+pub(crate) fn create_private(path: &Path) -> io::Result<OutputFile> {
+    let mut options = File::options();
+    options.write(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    create(path, &mut options)
+}
+
+fn create(path: &Path, options: &mut OpenOptions) -> io::Result<OutputFile> {
+    if fs::symlink_metadata(path).is_ok() {
+        match perform(Operation::Remove, path, || fs::remove_file(path)) {
+            Err(e) if e.kind() != ErrorKind::NotFound => return Err(e),
+            _ => {}
+        }
     }
     // `create_new` is O_EXCL, which refuses a link that was created in the meantime.
-    File::options().write(true).create_new(true).open(path)
+    let file = perform(Operation::Open, path, || options.create_new(true).open(path))?;
+    Ok(OutputFile::new(file, path))
 }
 
 /// Creates the missing folders from `root` down to `folder`. `root` must exist, and may be a link.
@@ -101,7 +120,10 @@ pub fn create_folders_below(root: &Path, folder: &Path) -> Result<()> {
     let mut at = root.to_owned();
     for name in names_below(root, folder)? {
         at.push(name);
-        match fs::create_dir(&at) {
+        if kind(&at)? == EntryKind::Folder {
+            continue;
+        }
+        match perform(Operation::CreateFolder, &at, || fs::create_dir(&at)) {
             Err(e) if e.kind() != ErrorKind::AlreadyExists => {
                 return Err(FileError::context("create the folder", &at)(e));
             }

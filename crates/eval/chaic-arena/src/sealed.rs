@@ -7,7 +7,7 @@ use chaic_core::TaskId;
 use chaic_episodes::{
     Episode, GenerateError, GeneratorSeeds, SeedRange, Settings, generate_episode,
 };
-use chaic_files::{FileError, write_atomically};
+use chaic_files::{FileError, create_folders, write_atomically};
 use hkdf::Hkdf;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -187,7 +187,7 @@ impl SealedSplit {
         stop: &AtomicBool,
         progress: &mut dyn FnMut(),
     ) -> Result<Option<Commitment>, ArenaError> {
-        std::fs::create_dir_all(folder).map_err(FileError::context("make the folder", folder))?;
+        create_folders(folder)?;
         let mut digest = Sha256::new();
         for task in &self.tasks {
             for k in 0..self.n_episodes {

@@ -1,10 +1,9 @@
 //! The organizer's secret.
 
 use std::fmt::{self, Write as _};
-use std::io::Write as _;
 use std::path::Path;
 
-use chaic_files::{FileError, read_user_file};
+use chaic_files::{FileError, read_user_file, write_new_private};
 
 /// Size of a secret, bytes: that of a SHA-256 digest.
 const BYTES: usize = 32;
@@ -45,14 +44,7 @@ impl Secret {
     pub fn create(path: &Path) -> Result<Secret, SecretError> {
         let mut key = [0; BYTES];
         getrandom::fill(&mut key).map_err(SecretError::Random)?;
-        let mut options = std::fs::OpenOptions::new();
-        options.write(true).create_new(true);
-        #[cfg(unix)]
-        std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
-        let mut file = options.open(path).map_err(FileError::context("create", path))?;
-        let text = to_hex(&key) + "\n";
-        let written = file.write_all(text.as_bytes()).and_then(|()| file.sync_all());
-        written.map_err(FileError::context("write", path))?;
+        write_new_private(path, (to_hex(&key) + "\n").as_bytes())?;
         Ok(Secret(key))
     }
 

@@ -6,7 +6,7 @@ use chaic_core::geom::{Camera, Rect, math, yaw_rotation};
 use chaic_core::{EntityId, Vec2, Vec3};
 use chaic_env::EnvError;
 use chaic_episodes::{Episode, house};
-use chaic_files::write_atomically;
+use chaic_files::{create_folders, write_atomically};
 use chaic_render::geometry::FINEST;
 use chaic_render::{Channels, Scene, View, image_out};
 use chaic_world::{ObjectSpec, Posture, RoomKind, Rules, Setup, World};
@@ -83,7 +83,7 @@ impl BenchScene {
     /// # Errors
     /// If a file cannot be written.
     pub fn write(&self, out: &Path) -> Result<SceneSummary> {
-        std::fs::create_dir_all(out).map_err(EvalError::io("make the folder", out))?;
+        create_folders(out)?;
         let name = |k: usize| format!("view {k:02}");
         let named: Vec<(String, Camera)> =
             self.cameras.iter().enumerate().map(|(k, c)| (name(k), *c)).collect();

@@ -9,7 +9,7 @@ use chaic_env::helper_registry::{self, HelperRegistry};
 use chaic_env::rules::RuleSet;
 use chaic_env::{Env, EnvError, EpisodeConfig};
 use chaic_episodes::Episode;
-use chaic_files::write_atomically;
+use chaic_files::{create_folders, write_atomically};
 use chaic_render::{Appearance, Channels, Scene, View, floor_plan, image_out};
 use chaic_world::{Rules, World};
 use image::{DynamicImage, ImageError, ImageFormat};
@@ -60,7 +60,7 @@ pub fn write(export: &FrameExport<'_>, helpers: &dyn HelperRegistry, out: &Path)
     let world = env.world();
     let view = View::from_agent(world, agent, size, Channels::ALL);
     let images = env.renderer().scene().render(world, &[view]).pop().unwrap_or_default();
-    std::fs::create_dir_all(out).map_err(EvalError::io("make the folder", out))?;
+    create_folders(out)?;
     let invalid_size = || EvalError::Image(format!("{size} is not a valid image size"));
     let rgb = images.rgb.as_deref().and_then(|b| image_out::rgb(b, size, size));
     save(rgb.ok_or_else(invalid_size)?.into(), &out.join("rgb.png"))?;

@@ -1,11 +1,13 @@
 //! Trace files. A trace is written to `NAME.partial` and renamed to `NAME` when it is complete.
 
-use std::fs::{self, File};
 use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use chaic_env::trace::{Header, MAX_TRACE_BYTES, Record, Trace, TraceWarning, parse};
-use chaic_files::{create_folders_below, create_or_replace, read_below, read_bounded};
+use chaic_files::{
+    OutputFile, create_folders_below, create_or_replace, read_below, read_bounded, remove_file,
+    rename,
+};
 
 use crate::error::{EvalError, Result};
 
@@ -46,7 +48,7 @@ pub(crate) fn first_differing_line(trace: &Trace, bytes: &[u8]) -> Option<usize>
 /// Writer of a trace file.
 #[derive(Debug)]
 pub struct TraceWriter {
-    file: BufWriter<File>,
+    file: BufWriter<OutputFile>,
     partial: PathBuf,
     path: PathBuf,
 }
@@ -82,14 +84,14 @@ impl TraceWriter {
         let convert = EvalError::io("write", &self.partial);
         let file = self.file.into_inner().map_err(|e| e.into_error());
         file.and_then(|f| f.sync_all()).map_err(convert)?;
-        fs::rename(&self.partial, &self.path).map_err(EvalError::io("rename", &self.partial))
+        Ok(rename(&self.partial, &self.path)?)
     }
 
     /// Removes the partial trace.
     pub fn discard(self) {
         // A file that remains is harmless: the next writer replaces it, and readers ignore its
         // name.
-        let _ = fs::remove_file(&self.partial);
+        let _ = remove_file(&self.partial);
     }
 
     fn line(&mut self, line: &str) -> Result<()> {

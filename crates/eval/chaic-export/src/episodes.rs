@@ -1,10 +1,9 @@
 //! Export of a split: one JSON file per episode, with a card and metadata.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use chaic_episodes::{Episode, Split};
-use chaic_files::{FileError, write_atomically};
+use chaic_files::{create_folders, write_atomically};
 
 use crate::card::{DataType, DatasetDescription, Field, FileGroup, Place, RecordSet, common};
 use crate::error::ExportError;
@@ -33,8 +32,7 @@ impl EpisodeSetWriter {
     /// If the folder is not empty or cannot be created.
     pub fn create(path: &Path) -> Result<EpisodeSetWriter, ExportError> {
         folder::create_empty(path)?;
-        let episodes = path.join(EPISODES);
-        fs::create_dir_all(&episodes).map_err(FileError::context("make", &episodes))?;
+        create_folders(&path.join(EPISODES))?;
         Ok(EpisodeSetWriter { folder: path.to_owned(), n: 0 })
     }
 

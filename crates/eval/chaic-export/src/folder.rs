@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use chaic_files::{FileError, write_atomically};
+use chaic_files::{create_folders, write_atomically};
 
 use crate::card::DatasetDescription;
 use crate::croissant;
@@ -14,7 +14,7 @@ pub(crate) fn create_empty(folder: &Path) -> Result<(), ExportError> {
     if fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some()) {
         return Err(ExportError::NotEmpty(folder.to_owned()));
     }
-    Ok(fs::create_dir_all(folder).map_err(FileError::context("make", folder))?)
+    Ok(create_folders(folder)?)
 }
 
 /// Writes the card `README.md` and the metadata `croissant.json`.

@@ -8,7 +8,7 @@ use chaic_core::{Action, AgentId, EntityId, Frame, Hand, ResolvedAction};
 use chaic_env::Playback;
 use chaic_env::trace::{Decision, Trace};
 use chaic_episodes::Episode;
-use chaic_files::{FileError, write_atomically};
+use chaic_files::{FileError, create_folders, write_atomically};
 use chaic_render::{Channels, Scene, View};
 use chaic_video::VideoWriter;
 use chaic_world::World;
@@ -158,7 +158,7 @@ impl LeRobotWriter {
     fn file(&self, kind: &str, episode: usize, extension: &str) -> Result<PathBuf, ExportError> {
         let (chunk, file) = (episode / CHUNK, episode % CHUNK);
         let folder = self.folder.join(kind).join(format!("chunk-{chunk:03}"));
-        fs::create_dir_all(&folder).map_err(FileError::context("make", &folder))?;
+        create_folders(&folder)?;
         Ok(folder.join(format!("file-{file:03}.{extension}")))
     }
 
@@ -285,7 +285,7 @@ impl LeRobotWriter {
     /// If a file cannot be written.
     pub fn finish(self) -> Result<usize, ExportError> {
         let meta = self.folder.join("meta");
-        fs::create_dir_all(&meta).map_err(FileError::context("make", &meta))?;
+        create_folders(&meta)?;
         // Readers use the names of tasks as the table's index.
         let pandas = json!({
             "index_columns": ["task"],

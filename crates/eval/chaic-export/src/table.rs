@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use chaic_files::create_or_replace;
+use chaic_files::write_atomically;
 use parquet::basic::{Compression, ConvertedType, LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{BoolType, ByteArray, ByteArrayType, FloatType, Int64Type};
 use parquet::errors::{ParquetError, Result};
@@ -122,8 +122,8 @@ pub fn write(path: &Path, columns: &[(&str, Column)], entries: &[(&str, String)]
         .set_created_by("chaic".to_owned())
         .set_key_value_metadata(Some(entries))
         .build();
-    let file = create_or_replace(path).map_err(|e| ParquetError::External(Box::new(e)))?;
-    let mut writer = SerializedFileWriter::new(file, schema, Arc::new(properties))?;
+    let mut bytes = Vec::new();
+    let mut writer = SerializedFileWriter::new(&mut bytes, schema, Arc::new(properties))?;
     let mut group = writer.next_row_group()?;
     for (_, column) in columns {
         let mut to = group.next_column()?.expect("the schema has as many columns");
@@ -132,5 +132,5 @@ pub fn write(path: &Path, columns: &[(&str, Column)], entries: &[(&str, String)]
     }
     group.close()?;
     writer.close()?;
-    Ok(())
+    write_atomically(path, &bytes).map_err(|e| ParquetError::External(Box::new(e)))
 }

@@ -2,12 +2,11 @@
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use chaic_core::TaskId;
 use chaic_env::CHAIC_VERSION;
-use chaic_files::{read_user_file, write_atomically};
+use chaic_files::{create_folders, read_user_file, write_atomically};
 
 use crate::experiment::Experiment;
 use crate::matrix::PartState;
@@ -46,7 +45,7 @@ pub fn write_document(inputs: ReportInputs<'_>, path: &Path) -> Result<()> {
     let causes = read_causes(path)?;
     let stem = path.file_stem().map_or("fidelity".into(), |s| s.to_string_lossy());
     let folder = path.parent().map_or(PathBuf::new(), Path::to_owned).join("images");
-    fs::create_dir_all(&folder).map_err(EvalError::io("make the folder", &folder))?;
+    create_folders(&folder)?;
     for part in inputs.rule_sets() {
         let bars = inputs.bars(part);
         let file = folder.join(figure_name(&stem, part));

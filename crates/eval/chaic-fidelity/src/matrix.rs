@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use chaic_core::{Frame, TaskId};
 use chaic_env::helper_registry::HelperRegistry;
 use chaic_env::{CHAIC_VERSION, EnvError, RunKey};
-use chaic_files::{EntryKind, TEMPORARY_SUFFIX, kind, read_bounded, write_atomically};
+use chaic_files::{
+    EntryKind, TEMPORARY_SUFFIX, create_folders, kind, read_bounded, write_atomically,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::experiment::{Experiment, ExperimentPart, ExperimentRequest};
@@ -79,7 +81,7 @@ impl Matrix {
             Matrix { path: path.to_owned(), plan: request.new_plan(&episodes)?, episodes: None };
         matrix.plan.check_names(&episodes, helpers)?;
         let matrix = Matrix { episodes: Some(episodes), ..matrix };
-        std::fs::create_dir_all(path).map_err(EvalError::io("make the folder", path))?;
+        create_folders(path)?;
         matrix.write()?;
         Ok(matrix)
     }

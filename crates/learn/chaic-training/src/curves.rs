@@ -93,7 +93,7 @@ pub(crate) fn append(folder: &Path, record: &CurveRecord) -> Result<(), FileErro
     let mut file = open_for_append(&path)?;
     // The line must be on disk before the checkpoint that counts it as written.
     let written = file.write_all(line.as_bytes()).and_then(|()| file.sync_data());
-    written.map_err(FileError::context("can't write", &path))
+    written.map_err(FileError::context("write", &path))
 }
 
 /// Returns whether a training has written curves.

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use chaic_files::{
-    FileError, FolderLock, LOCK, TEMPORARY_SUFFIX, entries, read_bounded, read_user_file,
-    write_atomically,
+    FolderLock, LOCK, TEMPORARY_SUFFIX, create_folders, entries, read_bounded, read_user_file,
+    remove_empty_folder, remove_file, write_atomically,
 };
 use chaic_nn::weights::WeightsError;
 
@@ -151,7 +151,7 @@ impl<T: Trainer> TrainingRun<T> {
             return Err(error);
         }
         let is_new = !folder.exists();
-        fs::create_dir_all(folder).map_err(FileError::context("can't make", folder))?;
+        create_folders(folder)?;
         let lock = FolderLock::acquire(folder)?;
         // Another process may have started between the first check and the lock.
         check_is_empty(folder)?;
@@ -388,10 +388,10 @@ fn check_is_empty(folder: &Path) -> Result<(), TrainingError> {
 fn remove_training(folder: &Path, is_new: bool) {
     // The original failure is reported; files that cannot be removed stay.
     for name in [CONFIG, INITIAL_WEIGHTS, CHECKPOINT] {
-        let _ = fs::remove_file(folder.join(name));
+        let _ = remove_file(&folder.join(name));
     }
     if is_new {
-        let _ = fs::remove_file(folder.join(LOCK));
-        let _ = fs::remove_dir(folder);
+        let _ = remove_file(&folder.join(LOCK));
+        let _ = remove_empty_folder(folder);
     }
 }

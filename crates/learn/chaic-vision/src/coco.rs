@@ -3,13 +3,12 @@
 //! millimeters.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::io::Cursor;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use chaic_core::ClassId;
-use chaic_files::{FileError, write_atomically};
+use chaic_files::{FileError, create_folders, write_atomically};
 use image::{ExtendedColorType, ImageEncoder as _, codecs::png::PngEncoder};
 use serde::Serialize;
 
@@ -275,7 +274,7 @@ pub fn collect(
 ) -> Result<BTreeMap<&'static str, SizeCounts>, FileError> {
     for name in [IMAGES, DEPTH] {
         let path = folder.join(name);
-        fs::create_dir_all(&path).map_err(FileError::context("make", &path))?;
+        create_folders(&path)?;
     }
     let mut views: Vec<AnnotatedView> = Vec::new();
     while views.len() < n_views && should_continue(views.len()) {

@@ -1,8 +1,8 @@
 //! Animated GIF with 256 colors per frame, for places that do not play video.
 
-use std::fs::File;
 use std::io::{BufWriter, Write as _};
 
+use chaic_files::OutputFile;
 use gif::{DisposalMethod, Encoder, EncodingError, Frame, Repeat};
 use image::RgbImage;
 
@@ -13,14 +13,14 @@ const PALETTE_SPEED: i32 = 10;
 
 /// Animated GIF writer.
 pub(super) struct GifSink {
-    encoder: Encoder<BufWriter<File>>,
+    encoder: Encoder<BufWriter<OutputFile>>,
     fps: u32,
     n_frames: u32,
 }
 
 impl GifSink {
     pub(super) fn open(
-        out: BufWriter<File>,
+        out: BufWriter<OutputFile>,
         width: u32,
         height: u32,
         fps: u32,
@@ -45,7 +45,9 @@ impl GifSink {
     }
 
     pub(super) fn finish(self) -> Result<(), SinkError> {
-        Ok(self.encoder.into_inner()?.flush()?)
+        let mut out = self.encoder.into_inner()?;
+        out.flush()?;
+        Ok(out.get_ref().sync_all()?)
     }
 }
 

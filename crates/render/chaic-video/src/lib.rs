@@ -10,10 +10,10 @@ mod mp4;
 #[cfg(feature = "mp4")]
 mod yuv;
 
-use std::fs::{self, File};
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
+use chaic_files::{OutputFile, create_or_replace, remove_file, rename};
 use image::RgbImage;
 
 /// File name extensions that this build supports.
@@ -131,18 +131,9 @@ impl PartialFile {
     }
 
     fn rename_to(mut self, path: &Path) -> io::Result<()> {
-        fs::rename(&self.path, path)?;
+        rename(&self.path, path).map_err(|e| e.error)?;
         self.is_kept = true;
         Ok(())
-    }
-}
-
-/// Creates an empty file and replaces an existing file or link of this name. Links are not
-/// followed.
-fn create_or_replace(path: &Path) -> io::Result<File> {
-    match fs::remove_file(path) {
-        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(e),
-        _ => File::options().write(true).create_new(true).open(path),
     }
 }
 
@@ -150,7 +141,7 @@ impl Drop for PartialFile {
     fn drop(&mut self) {
         if !self.is_kept {
             // If it cannot be removed, its name shows that it is partial.
-            let _ = fs::remove_file(&self.path);
+            let _ = remove_file(&self.path);
         }
     }
 }
@@ -245,7 +236,7 @@ impl VideoWriter {
 impl Sink {
     fn open(
         format: Format,
-        out: BufWriter<File>,
+        out: BufWriter<OutputFile>,
         width: u32,
         height: u32,
         fps: u32,

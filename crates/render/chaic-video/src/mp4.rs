@@ -1,9 +1,9 @@
 //! H.264 in MP4: OpenH264 encodes, `shiguredo_mp4` writes the container.
 
-use std::fs::File;
 use std::io::{BufWriter, Seek as _, SeekFrom, Write as _};
 use std::num::NonZeroU32;
 
+use chaic_files::OutputFile;
 use image::RgbImage;
 use openh264::OpenH264API;
 use openh264::encoder::{
@@ -34,7 +34,7 @@ const INDEX_BYTES: usize = 16 * 1024;
 
 /// MP4 writer.
 pub(super) struct Mp4Sink {
-    out: BufWriter<File>,
+    out: BufWriter<OutputFile>,
     position: u64,
     encoder: Encoder,
     muxer: Mp4FileMuxer,
@@ -45,7 +45,7 @@ pub(super) struct Mp4Sink {
 
 impl Mp4Sink {
     pub(super) fn open(
-        mut out: BufWriter<File>,
+        mut out: BufWriter<OutputFile>,
         width: u32,
         height: u32,
         fps: u32,
@@ -104,7 +104,8 @@ impl Mp4Sink {
             self.out.seek(SeekFrom::Start(offset))?;
             self.out.write_all(bytes)?;
         }
-        Ok(self.out.flush()?)
+        self.out.flush()?;
+        Ok(self.out.get_ref().sync_all()?)
     }
 }
 

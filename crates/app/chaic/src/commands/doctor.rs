@@ -1,6 +1,5 @@
 //! `chaic doctor`: checks of the machine and of the program.
 
-use std::fs;
 use std::path::Path;
 
 use anyhow::Result;
@@ -144,7 +143,8 @@ fn behavior_network() -> Check {
 /// Checks that a folder is writable by creating and removing a file.
 fn writable(name: &'static str, folder: &Path) -> Check {
     let path = folder.join(format!(".chaic-doctor-{}", std::process::id()));
-    let result = chaic_files::create_or_replace(&path).and_then(|_| fs::remove_file(&path));
+    let created = chaic_files::create_or_replace(&path).map(drop);
+    let result = created.and_then(|()| chaic_files::remove_file(&path).map_err(|e| e.error));
     let shown = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
     match result {
         Ok(()) => check(name, Status::Ok, format!("{} is writable", shown.display())),

@@ -9,7 +9,7 @@ use chaic_episodes::{Episode, EpisodeError, Split, episodes, find_episode, json_
 use chaic_eval::frame_export;
 use chaic_eval::read_episode_file;
 use chaic_export::episodes::file_name;
-use chaic_files::write_atomically;
+use chaic_files::{create_folders, write_atomically};
 use comfy_table::Table;
 use serde_json::json;
 
@@ -114,8 +114,7 @@ fn show(argument: &str, out: &Path, width_px: u32, format: OutputFormat) -> Resu
 }
 
 fn generate(task: TaskId, split: &Split, out: &Path, format: OutputFormat) -> Result<ExitStatus> {
-    std::fs::create_dir_all(out)
-        .with_context(|| format!("can't make the folder {}", out.display()))?;
+    create_folders(out)?;
     let stop = interrupt::stop_flag()?;
     let n = split.len_of(task);
     if n == 0 {

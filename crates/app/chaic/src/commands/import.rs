@@ -1,7 +1,7 @@
 //! `chaic import`.
 
-use anyhow::{Context as _, Result};
-use chaic_files::write_atomically;
+use anyhow::Result;
+use chaic_files::{create_folders, write_atomically};
 use chaic_import::{Half, OnError, Sources, import};
 use serde_json::json;
 
@@ -26,8 +26,7 @@ fn original(arguments: &OriginalArguments, format: OutputFormat) -> Result<ExitS
     let sources = Sources { dataset: dataset.clone(), tdw: tdw.clone(), half };
     let on_error = if *keep_going { OnError::Skip } else { OnError::Stop };
     let imported = import(&sources, on_error)?;
-    std::fs::create_dir_all(out)
-        .with_context(|| format!("can't make the folder {}", out.display()))?;
+    create_folders(out)?;
     for episode in &imported.episodes {
         let path = out.join(format!("{}.json", episode.id().replace('/', "-")));
         write_atomically(&path, episode.to_json().as_bytes())?;

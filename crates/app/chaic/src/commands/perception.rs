@@ -1,10 +1,8 @@
 //! `chaic eval detection`, `chaic eval behavior` and `chaic eval tracks`.
 
-use std::fs;
-
 use anyhow::Result;
 use chaic_episodes::DatasetSplit;
-use chaic_files::{FileError, write_atomically};
+use chaic_files::{create_folders, write_atomically};
 use chaic_vision::behavior::Behavior;
 use chaic_vision::behavior::network::TrainedBehavior;
 use chaic_vision::behavior::report::{BehaviorReport, report as behavior_report};
@@ -44,7 +42,7 @@ pub fn evaluate_detection(
     print_result(format, &report, &detection_text(&report, arguments))?;
     if let Some(folder) = &arguments.coco {
         let (annotations, results): (Vec<_>, Vec<_>) = records.into_iter().flatten().unzip();
-        fs::create_dir_all(folder).map_err(FileError::context("make", folder))?;
+        create_folders(folder)?;
         let description = format!("{scenes:?} views of chaic, {appearance:?} look");
         write_atomically(&folder.join(ANNOTATIONS), &annotations_json(&annotations, &description))?;
         let results = serde_json::to_vec(&results.concat()).expect("detections serialize");

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::{Context as _, Result};
-use chaic_files::write_atomically;
+use chaic_files::{create_folders, write_atomically};
 use clap::Command;
 use clap_complete::generate;
 use clap_mangen::Man;
@@ -26,8 +26,7 @@ pub fn completions(arguments: &CompletionsArguments, format: OutputFormat) -> Re
 /// Writes a manual page for each command.
 pub fn man(arguments: &ManArguments, format: OutputFormat) -> Result<ExitStatus> {
     let folder = &arguments.folder;
-    std::fs::create_dir_all(folder)
-        .with_context(|| format!("can't make the folder {}", folder.display()))?;
+    create_folders(folder)?;
     let mut root = command().disable_help_subcommand(true);
     root.build();
     let mut pages = Vec::new();

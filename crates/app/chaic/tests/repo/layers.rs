@@ -281,6 +281,41 @@ fn no_code_depends_on_the_name_of_a_task() {
     assert!(n_files > 100, "{n_files} files");
 }
 
+/// Faults are injected, and links refused, in `chaic-files` only.
+#[test]
+fn every_file_is_written_through_chaic_files() {
+    let calls = [
+        "fs::write(",
+        "fs::create_dir",
+        "fs::remove_",
+        "fs::rename(",
+        "fs::copy(",
+        "fs::hard_link(",
+        "File::create",
+        "File::options(",
+        "OpenOptions",
+    ];
+    // The sandbox builds the private root of a helper. The Python helper writes to a pipe.
+    let exempt = ["core/chaic-files/", "core/chaic-sandbox/", "chaic-python/src/isolated.rs"];
+    let mut files = Vec::new();
+    for layer in LAYERS {
+        sources(&root().join("crates").join(layer), &mut files);
+    }
+    let mut n_files = 0;
+    for path in files {
+        let file = path.to_string_lossy().replace('\\', "/");
+        if exempt.iter().any(|exempt| file.contains(exempt)) || !file.contains("/src/") {
+            continue;
+        }
+        n_files += 1;
+        let code = code(&path);
+        let code = code.split("\nmod tests {").next().unwrap_or_default();
+        let found = calls.iter().find(|call| code.contains(*call));
+        assert!(found.is_none(), "{file}: {found:?}; use chaic-files");
+    }
+    assert!(n_files > 200, "{n_files} files");
+}
+
 /// Returns the modules that code names as `crate::NAME`.
 fn named_modules(code: &str) -> Vec<&str> {
     let ends = |c: char| !(c.is_alphanumeric() || c == '_');

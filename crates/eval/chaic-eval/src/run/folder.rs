@@ -1,14 +1,14 @@
 //! Folder of a run: paths of its files, and the lock of its writer.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use chaic_env::trace::{Trace, TraceWarning};
 use chaic_env::{CHAIC_VERSION, Digest, EnvError, RunKey, slug};
 use chaic_episodes::{Episode, MAX_EPISODE_BYTES, find_episode};
 use chaic_files::{
-    Entry, EntryKind, FolderLock, LOCK, LockError, TEMPORARY_SUFFIX, entries, is_file_below, kind,
-    kind_below, open_or_create, read_below, read_bounded, walk, write_atomically,
+    Entry, EntryKind, FolderLock, LOCK, LockError, TEMPORARY_SUFFIX, create_folders, entries,
+    is_file_below, kind, kind_below, open_or_create, read_below, read_bounded, remove_file,
+    remove_folder, walk, write_atomically,
 };
 use serde::{Deserialize, Serialize};
 
@@ -190,7 +190,7 @@ impl RunFolder {
             }
             return Err(error);
         }
-        fs::create_dir_all(path).map_err(EvalError::io("make the folder", path))?;
+        create_folders(path)?;
         let lock = take_lock(path)?;
         // Another process may have written between the first check and the lock.
         check_access(path, access)?;
@@ -201,7 +201,7 @@ impl RunFolder {
         };
         // Left by a merge that was killed after its last step. It has no effect if it can't be
         // removed.
-        let _ = fs::remove_file(folder.join(MERGING));
+        let _ = remove_file(&folder.join(MERGING));
         if file.chaic != CHAIC_VERSION {
             return Err(EvalError::Env(EnvError::OtherVersion {
                 path: folder.join(RUN_FILE),
@@ -394,7 +394,7 @@ impl RunFolder {
     /// Removes the marker file of a merge.
     pub(crate) fn end_merge(&self) -> Result<()> {
         let marker = self.join(MERGING);
-        fs::remove_file(&marker).map_err(EvalError::io("remove", &marker))
+        Ok(remove_file(&marker)?)
     }
 
     /// Removes the files of [`FolderState::Unstarted`] or [`FolderState::InterruptedMerge`] except
@@ -402,11 +402,10 @@ impl RunFolder {
     fn clear_leftovers(&self) -> Result<()> {
         let leftovers = entries(&self.path)?;
         for path in leftovers.iter().filter(|p| ![LOCK, MERGING].contains(&name(p))) {
-            let removed = match kind(path)? {
-                EntryKind::Folder => fs::remove_dir_all(path),
-                _ => fs::remove_file(path),
-            };
-            removed.map_err(EvalError::io("remove", path))?;
+            match kind(path)? {
+                EntryKind::Folder => remove_folder(path)?,
+                _ => remove_file(path)?,
+            }
         }
         Ok(())
     }

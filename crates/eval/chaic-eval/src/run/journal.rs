@@ -1,14 +1,13 @@
 //! Journal of a run: one line per finished episode run, synced to disk before the next one starts.
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::{BufRead as _, BufReader, ErrorKind, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use chaic_core::Frame;
 use chaic_env::trace::TraceWarning;
 use chaic_env::{EnvError, RunKey};
-use chaic_files::{open_file, open_for_append, write_atomically};
+use chaic_files::{OutputFile, open_file, open_for_append, write_atomically};
 
 use crate::error::{EvalError, Result};
 use crate::metrics::RunResult;
@@ -22,7 +21,7 @@ const MAX_LINE_BYTES: u64 = 8 << 20;
 /// A journal that is open for appending.
 #[derive(Debug)]
 pub struct Journal {
-    file: File,
+    file: OutputFile,
     path: PathBuf,
     /// True if a later line replaces the finished result of an episode run.
     has_duplicates: bool,

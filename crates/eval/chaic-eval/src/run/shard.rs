@@ -3,14 +3,13 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use chaic_env::RunKey;
 use chaic_env::trace::MAX_TRACE_BYTES;
 use chaic_files::{
-    EntryKind, FileError, create_folders_below, create_or_replace, entries, kind, read_below,
+    EntryKind, FileError, create_folders_below, entries, kind, read_below, write_atomically,
 };
 
 use super::folder::{COMMANDS, EPISODES, RECORDS};
@@ -183,8 +182,8 @@ fn copy_episodes(source: &RunFolder, folder: &RunFolder) -> Result<()> {
     Ok(())
 }
 
-/// Copies a regular file from one run to another. It does not sync: an interrupted merge is
-/// repeated as a whole.
+/// Copies a regular file from one run to another. The copy is on disk before `run.json`, which makes
+/// the folder a run.
 fn copy(source: &RunFolder, from: &Path, folder: &RunFolder, to: &Path) -> Result<()> {
     // Traces have the highest size limit of all files of a run.
     let bytes = read_below(source.path(), from, MAX_TRACE_BYTES + 1)?;
@@ -194,6 +193,5 @@ fn copy(source: &RunFolder, from: &Path, folder: &RunFolder, to: &Path) -> Resul
         return Err(FileError::context("copy", from)(std::io::Error::other(problem)).into());
     }
     create_folders_below(folder.path(), to.parent().unwrap_or(folder.path()))?;
-    let written = create_or_replace(to).and_then(|mut file| file.write_all(&bytes));
-    Ok(written.map_err(FileError::context("write", to))?)
+    Ok(write_atomically(to, &bytes)?)
 }

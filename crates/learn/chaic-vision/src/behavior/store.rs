@@ -2,11 +2,10 @@
 //! resumed, and trainings reuse the clips.
 
 use std::borrow::Cow;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use chaic_core::Frame;
-use chaic_files::{FileError, read_bounded, write_atomically};
+use chaic_files::{FileError, create_folders, read_bounded, write_atomically};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
 
 use super::Behavior;
@@ -56,7 +55,7 @@ impl ClipFolder {
         split: DatasetSplit,
         config: &ClipCollectionConfig,
     ) -> Result<ClipFolder, StoreError> {
-        fs::create_dir_all(folder).map_err(FileError::context("make", folder))?;
+        create_folders(folder)?;
         let path = folder.join(CONFIG);
         let text = format!(
             "part = \"{split}\"\n{}",
@@ -196,6 +195,8 @@ fn from_bytes(bytes: &[u8]) -> Result<Vec<Clip>, String> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     fn clip(label: Behavior, first: Frame) -> Clip {

@@ -1,0 +1,142 @@
+//! Runs of the command `chaic` in processes of their own, with or without a fault.
+
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::{Command, ExitCode, Stdio};
+
+use anyhow::{Context as _, Result, bail};
+use chaic_files::faults::{self, FaultKind, FaultPlan, Operation};
+use chaic_sandbox::Launcher;
+
+/// Exit code of a program that panicked.
+const PANICKED: i32 = 101;
+
+/// End of a command.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Ended {
+    /// Exit code; `None` after a signal.
+    pub code: Option<i32>,
+    /// Standard output.
+    pub stdout: String,
+    /// Standard error.
+    pub stderr: String,
+}
+
+impl Ended {
+    /// Returns what is wrong with the end of any command: a panic, or an exit code without one line of
+    /// explanation.
+    pub fn problem(&self) -> Option<String> {
+        let n_errors = self.stderr.lines().filter(|line| line.starts_with("error:")).count();
+        if self.code == Some(PANICKED) || self.stderr.contains("panicked") {
+            return Some(format!("panic: {}", self.stderr.trim()));
+        }
+        let is_explained = self.code == Some(0) || n_errors == 1 || !self.stdout.is_empty();
+        (!is_explained).then(|| format!("exit code {:?}, {n_errors} error lines", self.code))
+    }
+}
+
+/// Returns the command line of this program as `chaic`, in a folder.
+pub fn chaic(folder: &Path, fault: Option<&FaultPlan>, log: Option<&Path>) -> Result<Command> {
+    let program = std::env::current_exe().context("can't find this program")?;
+    let mut command = Command::new(program);
+    command.current_dir(folder).stdin(Stdio::null()).arg("chaic");
+    if let Some(FaultPlan { path, index, kind }) = fault {
+        command.args(["--fault", kind.name(), "--at", &index.to_string()]).arg("--path").arg(path);
+    }
+    if let Some(log) = log {
+        command.arg("--log").arg(log);
+    }
+    command.arg("--");
+    Ok(command)
+}
+
+/// Runs `chaic` in a folder until it ends.
+///
+/// # Errors
+/// If the process cannot be started.
+pub fn run(folder: &Path, arguments: &[&str], fault: Option<&FaultPlan>) -> Result<Ended> {
+    let output = chaic(folder, fault, None)?.args(arguments).output().context("can't start")?;
+    let text = |bytes: Vec<u8>| String::from_utf8_lossy(&bytes).into_owned();
+    let (stdout, stderr) = (text(output.stdout), text(output.stderr));
+    Ok(Ended { code: output.status.code(), stdout, stderr })
+}
+
+/// Runs `chaic` in a folder; it must succeed.
+///
+/// # Errors
+/// If it fails.
+pub fn run_ok(folder: &Path, arguments: &[&str]) -> Result<Ended> {
+    let ended = run(folder, arguments, None)?;
+    if ended.code != Some(0) {
+        let code = ended.code;
+        bail!("`chaic {}`: exit code {code:?}: {}", arguments.join(" "), ended.stderr.trim());
+    }
+    Ok(ended)
+}
+
+/// File operation of a command.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct FileOperation {
+    /// The file or folder that it changes.
+    pub path: String,
+    /// Number among the operations on this path, from 0.
+    pub index: usize,
+    /// Name of its kind.
+    pub kind: String,
+}
+
+/// Runs `chaic` in a folder, and returns its file operations, sorted: threads may change their order.
+///
+/// # Errors
+/// If it fails.
+pub fn operations(folder: &Path, arguments: &[&str], log: &Path) -> Result<Vec<FileOperation>> {
+    let output = chaic(folder, None, Some(log))?.args(arguments).output().context("can't start")?;
+    if !output.status.success() {
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        bail!("`chaic {}` without faults: {}", arguments.join(" "), stderr.trim());
+    }
+    let text = std::fs::read_to_string(log).context("can't read the list of operations")?;
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut found = Vec::new();
+    for (kind, path) in text.lines().filter_map(|line| line.split_once('\t')) {
+        let count = counts.entry(path).or_default();
+        found.push(FileOperation { path: path.to_owned(), index: *count, kind: kind.to_owned() });
+        *count += 1;
+    }
+    found.sort();
+    Ok(found)
+}
+
+/// Plays the command `chaic` in this process, with a fault.
+pub fn run_chaic(
+    fault: Option<FaultPlan>,
+    log: Option<&Path>,
+    arguments: Vec<OsString>,
+) -> ExitCode {
+    if fault.is_some() || log.is_some() {
+        faults::install(fault);
+    }
+    let arguments = std::iter::once("chaic".into()).chain(arguments);
+    let code = chaic::run(arguments, &Launcher::this_program());
+    if let Some(log) = log {
+        let text = faults::operations().iter().fold(String::new(), |mut text, record| {
+            let _ = writeln!(text, "{:?}\t{}", record.operation, record.path.display());
+            text
+        });
+        if let Err(error) = std::fs::write(log, text) {
+            eprintln!("error: can't write {}: {error}", log.display());
+            return ExitCode::FAILURE;
+        }
+    }
+    ExitCode::from(code)
+}
+
+impl FileOperation {
+    /// Returns whether the operation can fail in this way.
+    pub fn can_fail(&self, kind: FaultKind) -> bool {
+        let is_named = |o: &Operation| format!("{o:?}") == self.kind;
+        Operation::ALL.into_iter().find(is_named).is_some_and(|o| kind.applies_to(o))
+    }
+}

@@ -1,0 +1,195 @@
+//! Valid inputs to start from.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result};
+use chaic_core::observation::{Grants, SensorConfig};
+use chaic_core::{AgentId, TaskId};
+use chaic_env::{AgentSlot, Env, EpisodeAgents, EpisodeConfig, RunKey};
+use chaic_episodes::{Episode, find_episode};
+use chaic_llm::exchange::{ChatRequest, Exchange, Message, Purpose, Reply, Role, Usage};
+use chaic_llm::record::{RecordEntry, RecordHeader};
+use chaic_nn::{Kernel, Network, weights};
+use chaic_subprocess::frame::MessageFrame;
+use chaic_subprocess::message::{PROTOCOL, RequestMessage, observation_frame};
+use chaic_training::checkpoint::{Checkpoint, Identity};
+use serde_json::json;
+
+use crate::commands::run_ok;
+use crate::scenario::{EPISODE_STEPS, PLAY, prepare, words};
+
+/// Kind of the small network in weights files and checkpoints.
+pub const KIND: &str = "fuzz 1";
+
+/// Valid inputs, and a folder for files.
+pub struct Inputs {
+    /// Folder for the files that parsers read.
+    pub scratch: PathBuf,
+    /// Finished run of short episodes.
+    pub run: PathBuf,
+    /// Commitment to a sealed split.
+    commitment: PathBuf,
+    /// Episode of [`Inputs::trace`].
+    pub episode: Episode,
+}
+
+impl Inputs {
+    /// Plays a short run in an empty folder.
+    ///
+    /// # Errors
+    /// If the run fails.
+    pub fn new(folder: &Path) -> Result<Inputs> {
+        prepare(&EPISODE_STEPS, folder)?;
+        run_ok(folder, &words(PLAY))?;
+        let scratch = folder.join("scratch");
+        fs::create_dir(&scratch)?;
+        let copy = fs::read(folder.join("run/episodes/shopping-gen-0.json"))?;
+        let episode = Episode::parse(&copy, "the episode")?;
+        run_ok(
+            folder,
+            &words("episodes seal --secret s --task shopping --n-episodes 1 --out seal"),
+        )?;
+        let commitment = folder.join("seal/commitment.json");
+        Ok(Inputs { scratch, run: folder.join("run"), commitment, episode })
+    }
+
+    /// Reads a file of the run.
+    ///
+    /// # Errors
+    /// If it does not exist.
+    pub fn file(&self, name: &str) -> Result<Vec<u8>> {
+        fs::read(self.run.join(name)).with_context(|| format!("the run has no {name}"))
+    }
+
+    /// Returns the commitment to a sealed split.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn commitment(&self) -> Result<Vec<u8>> {
+        fs::read(&self.commitment).context("no commitment")
+    }
+
+    /// Returns a trace of [`Inputs::episode`].
+    ///
+    /// # Errors
+    /// If the run has none.
+    pub fn trace(&self) -> Result<Vec<u8>> {
+        self.file("traces/shopping/rhp/gen-0-s0.jsonl")
+    }
+}
+
+/// Returns a network with every kind of parameter.
+pub fn network() -> Network {
+    let mut net = Network::default();
+    let input = net.input(3);
+    let conv = net.conv("conv", input, Kernel { size: 3, stride: 2 }, 4);
+    let norm = net.norm_relu("norm", conv);
+    net.output_head("head", norm, 4);
+    net
+}
+
+/// Returns a weights file of [`network`].
+pub fn weights_file() -> Vec<u8> {
+    let net = network();
+    weights::to_bytes(&net, &net.init_parameters(1), KIND).expect("the parameters are finite")
+}
+
+/// Returns a checkpoint of [`network`].
+pub fn checkpoint() -> Vec<u8> {
+    let mut checkpoint = Checkpoint::default();
+    checkpoint.insert_integers("steps", vec![7, u64::MAX]);
+    checkpoint.insert_floats("parameters", vec![1.0, -2.5, 0.0]);
+    checkpoint.insert_doubles("powers", vec![0.5]);
+    checkpoint.insert_bytes("choices", vec![1, 2, 3]);
+    checkpoint.to_bytes(&Identity::new(KIND, &network())).expect("the numbers are finite")
+}
+
+/// Returns a request of a language helper.
+pub fn request() -> ChatRequest {
+    let message =
+        Message { role: Role::User, text: "Choose a plan".to_owned(), images: Vec::new() };
+    let (model, messages) = ("m".to_owned(), vec![message]);
+    ChatRequest { model, purpose: Purpose::Decide, messages, n_schema_plans: Some(3) }
+}
+
+/// Returns the record of a language helper.
+pub fn record() -> Vec<u8> {
+    let key = RunKey {
+        task: TaskId::Shopping,
+        helper: "llm".to_owned(),
+        episode: "shopping/gen/0".to_owned(),
+        seed: 0,
+    };
+    let usage = Usage { prompt: 10, answer: 3, estimated: false };
+    let text = "Plan: 2".to_owned();
+    let reply = Reply::Answer { text, finish: Some("stop".to_owned()), usage, latency_ms: 5 };
+    let exchange = Exchange::new(7, request(), Vec::new(), reply);
+    let header = RecordHeader::new(&key, AgentId::HELPER, "m");
+    let header = serde_json::to_string(&header).expect("a header serializes to JSON");
+    let entry = RecordEntry::Exchange(Box::new(exchange));
+    let entry = serde_json::to_string(&entry).expect("an entry serializes to JSON");
+    format!("{header}\n{entry}\n{entry}\n").into_bytes()
+}
+
+/// Answers of a language model to a list of three plans.
+const ANSWERS: [&str; 5] = [
+    "Plan: 2",
+    "{\"reasoning\": \"near\", \"plan\": 2}",
+    "I choose option **3**, to explore.",
+    "plan 1 or plan 2? The answer is (2)",
+    "go to the box",
+];
+
+/// Returns answers of a language model.
+pub fn answers() -> Vec<Vec<u8>> {
+    ANSWERS.map(|text| text.as_bytes().to_vec()).into()
+}
+
+/// Returns replies of an endpoint.
+pub fn replies() -> Vec<Vec<u8>> {
+    let usage = json!({"prompt_tokens": 10, "completion_tokens": 3});
+    let whole = |text: &str| {
+        let message = json!({"role": "assistant", "content": text});
+        json!({"choices": [{"message": message, "finish_reason": "stop"}], "usage": usage})
+    };
+    let parts = json!({"choices": [{"message": {"content": [{"type": "text", "text": "2"}]}}]});
+    let all = ANSWERS.iter().map(|text| whole(text)).chain([parts]);
+    all.map(|reply| reply.to_string().into_bytes()).collect()
+}
+
+/// Returns messages to a helper in another process, one after the other.
+///
+/// # Errors
+/// If the episode cannot be started.
+pub fn request_frames() -> Result<Vec<u8>> {
+    let episode = find_episode("shopping/test/00")?;
+    let config = EpisodeConfig { image_size: Some(8), ..EpisodeConfig::new(&episode, "fuzz") };
+    let sensors =
+        SensorConfig { image_size: 8, rgb: true, depth: true, ids: false, frame_history: None };
+    let helper = Some(AgentSlot::external(Grants::NONE, sensors));
+    let mut env = Env::new(config, EpisodeAgents { helper, partner: None })?;
+    let briefing = env.briefing(AgentId::HELPER);
+    env.advance(Some(1))?;
+    let hello = RequestMessage::Hello { protocol: PROTOCOL, chaic: "0.1.0".to_owned() };
+    let mut frames =
+        vec![head(&hello), head(&RequestMessage::Reset { briefing: Box::new(briefing) })];
+    frames.extend(env.observe(AgentId::HELPER).map(observation_frame));
+    frames.push(head(&RequestMessage::Bye));
+    Ok(to_bytes(&frames))
+}
+
+/// Returns a message without images.
+pub fn head(message: &impl serde::Serialize) -> MessageFrame {
+    let head = serde_json::to_vec(message).expect("a message serializes to JSON");
+    MessageFrame { head, body: Vec::new() }
+}
+
+/// Returns messages as they are on the pipe.
+pub fn to_bytes(frames: &[MessageFrame]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for frame in frames {
+        frame.write(&mut bytes).expect("the lengths are within the limits");
+    }
+    bytes
+}

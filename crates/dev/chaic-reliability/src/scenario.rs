@@ -1,0 +1,256 @@
+//! Commands that write files, with their inputs and the way back after an interruption.
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context as _, Result, bail};
+
+use crate::commands::run_ok;
+
+/// Frames of the episodes: a few decisions of each agent.
+const FRAMES: u32 = 40;
+
+/// Step that prepares the inputs of a scenario.
+#[derive(Clone, Copy)]
+pub enum Step {
+    /// Runs `chaic` with these arguments, separated by spaces.
+    Run(&'static str),
+    /// Shortens the episodes in a folder to [`FRAMES`].
+    Shorten(&'static str),
+    /// Writes the configuration `c.toml` of a training with this number of steps.
+    TrainingConfig(u64),
+}
+
+/// Way to complete an interrupted command.
+#[derive(Clone, Copy)]
+pub enum Recovery {
+    /// Run the same command again.
+    Repeat,
+    /// Run another command if a file exists, and otherwise the same one again.
+    Resume {
+        /// File that marks what can be resumed.
+        marker: &'static str,
+        /// Arguments of the command that resumes.
+        command: &'static str,
+    },
+    /// Remove the outputs and run the same command again.
+    StartOver,
+}
+
+/// Command that reads the result of a scenario.
+#[derive(Clone, Copy)]
+pub struct Reader {
+    /// Its arguments.
+    pub command: &'static str,
+    /// True if it must refuse an interrupted result, or print the same as for a complete one.
+    pub is_exact: bool,
+}
+
+/// A command that writes files.
+pub struct Scenario {
+    /// Name for the command line.
+    pub name: &'static str,
+    /// True if it takes seconds; it runs only if it is named.
+    pub is_long: bool,
+    /// Preparation in an empty folder.
+    pub steps: &'static [Step],
+    /// Arguments of the command.
+    pub command: &'static str,
+    /// Files and folders that it writes.
+    pub outputs: &'static [&'static str],
+    /// Way back after an interruption.
+    pub recovery: Recovery,
+    /// Readers of the result, which run after the interruption and again after the recovery.
+    pub readers: &'static [Reader],
+}
+
+/// Step that generates an episode in `e`.
+pub const GENERATE: Step = Step::Run("episodes generate --task shopping --seeds 0..1 --out e");
+/// Steps that generate a short episode in `e`.
+pub const EPISODE_STEPS: [Step; 2] = [GENERATE, Step::Shorten("e")];
+/// Arguments that play it in `run`.
+pub const PLAY: &str = "eval --episodes e --helper none,rhp --size 16 --jobs 1 --out run";
+const PLAYED: [Step; 3] = [GENERATE, Step::Shorten("e"), Step::Run(PLAY)];
+const RESUME_RUN: Recovery =
+    Recovery::Resume { marker: "run/run.json", command: "eval --resume --jobs 1 --out run" };
+const COLLECT: Step =
+    Step::Run("collect opponent --out w --of-each 20 --episodes 1 --image-size 32");
+const RESUME_TRAINING: Recovery =
+    Recovery::Resume { marker: "t/config.toml", command: "train opponent --resume --out t" };
+/// Readers of an unfinished run accept what is finished.
+const RUN_READERS: [Reader; 2] = [
+    Reader { command: "verify run", is_exact: false },
+    Reader { command: "report run --from-traces", is_exact: false },
+];
+
+/// All scenarios.
+pub const SCENARIOS: [Scenario; 10] = [
+    Scenario {
+        name: "run",
+        is_long: false,
+        steps: &EPISODE_STEPS,
+        command: PLAY,
+        outputs: &["run"],
+        recovery: RESUME_RUN,
+        readers: &RUN_READERS,
+    },
+    Scenario {
+        name: "resume",
+        is_long: false,
+        steps: &[
+            GENERATE,
+            Step::Shorten("e"),
+            Step::Run(
+                "eval --episodes e --helper none,rhp --size 16 --jobs 1 --shard 1/2 --out run",
+            ),
+        ],
+        command: "eval --resume --jobs 1 --out run",
+        outputs: &["run"],
+        recovery: Recovery::Repeat,
+        readers: &RUN_READERS,
+    },
+    Scenario {
+        name: "merge",
+        is_long: false,
+        steps: &[
+            GENERATE,
+            Step::Shorten("e"),
+            Step::Run("eval --episodes e --helper none,rhp --size 16 --jobs 1 --shard 1/2 --out a"),
+            Step::Run("eval --episodes e --helper none,rhp --size 16 --jobs 1 --shard 2/2 --out b"),
+        ],
+        command: "merge --out run a b",
+        outputs: &["run"],
+        recovery: RESUME_RUN,
+        readers: &[
+            Reader { command: "verify run", is_exact: true },
+            Reader { command: "report run", is_exact: true },
+        ],
+    },
+    Scenario {
+        name: "report",
+        is_long: false,
+        steps: &PLAYED,
+        command: "report run --figure f.png",
+        outputs: &["f.png"],
+        recovery: Recovery::Repeat,
+        readers: &[Reader { command: "verify run", is_exact: true }],
+    },
+    Scenario {
+        name: "replay",
+        is_long: false,
+        steps: &PLAYED,
+        command: "replay run shopping/gen/0 --out r.gif --every 10",
+        outputs: &["r.gif"],
+        recovery: Recovery::Repeat,
+        readers: &[],
+    },
+    Scenario {
+        name: "export",
+        is_long: false,
+        steps: &PLAYED,
+        command: "export lerobot run --out set --every 30 --size 32",
+        outputs: &["set"],
+        recovery: Recovery::StartOver,
+        readers: &[],
+    },
+    Scenario {
+        name: "train",
+        is_long: false,
+        steps: &[COLLECT, Step::TrainingConfig(200)],
+        command: "train opponent --config c.toml --out t",
+        outputs: &["t"],
+        recovery: RESUME_TRAINING,
+        readers: &[],
+    },
+    Scenario {
+        name: "long-train",
+        is_long: true,
+        steps: &[COLLECT, Step::TrainingConfig(3000)],
+        command: "train opponent --config c.toml --out t",
+        outputs: &["t"],
+        recovery: RESUME_TRAINING,
+        readers: &[],
+    },
+    Scenario {
+        name: "seal",
+        is_long: false,
+        steps: &[Step::Run("episodes seal --secret s --task shopping --n-episodes 2 --out first")],
+        command: "episodes seal --secret s --task shopping --n-episodes 2 --out sealed",
+        outputs: &["sealed"],
+        recovery: Recovery::Repeat,
+        readers: &[Reader {
+            command: "episodes open --secret s --commitment sealed/commitment.json --out opened",
+            is_exact: true,
+        }],
+    },
+    Scenario {
+        name: "secret",
+        is_long: false,
+        steps: &[],
+        command: "episodes seal --secret s --task shopping --n-episodes 1 --out sealed",
+        outputs: &[],
+        recovery: Recovery::Repeat,
+        readers: &[Reader {
+            command: "episodes open --secret s --commitment sealed/commitment.json --out opened",
+            is_exact: false,
+        }],
+    },
+];
+
+/// Configuration of a fast training.
+const TRAINING: &str = "warm_up = 1\nbatch_size = 1\nvalidation_max_per_class = 5\n\
+                        windows = \"w\"\n[collect]\nepisodes = 1\nimage_size = 32\n";
+
+/// Prepares inputs in an empty folder.
+///
+/// # Errors
+/// If a step fails.
+pub fn prepare(steps: &[Step], folder: &Path) -> Result<()> {
+    for step in steps {
+        match step {
+            Step::Run(command) => drop(run_ok(folder, &words(command))?),
+            Step::Shorten(episodes) => shorten(&folder.join(episodes), FRAMES)?,
+            Step::TrainingConfig(steps) => {
+                fs::write(folder.join("c.toml"), format!("steps = {steps}\n{TRAINING}"))?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Splits arguments at spaces.
+pub fn words(line: &str) -> Vec<&str> {
+    line.split(' ').collect()
+}
+
+/// Shortens the episode files of a folder.
+///
+/// # Errors
+/// If a file is no episode or cannot be written.
+pub fn shorten(folder: &Path, frames: u32) -> Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        let text = fs::read_to_string(&path)?;
+        let mut episode: serde_json::Value = serde_json::from_str(&text)?;
+        let horizon = episode.pointer_mut("/setup/horizon").context("an episode has a horizon")?;
+        *horizon = frames.into();
+        fs::write(&path, serde_json::to_string(&episode)?)?;
+    }
+    Ok(())
+}
+
+/// Returns the scenarios of these names; all short ones for an empty list.
+///
+/// # Errors
+/// If a name is unknown.
+pub fn select(names: &[String]) -> Result<Vec<&'static Scenario>> {
+    if let Some(unknown) = names.iter().find(|name| !SCENARIOS.iter().any(|s| s.name == **name)) {
+        let known: Vec<&str> = SCENARIOS.iter().map(|s| s.name).collect();
+        bail!("no scenario `{unknown}`; the scenarios are {}", known.join(", "));
+    }
+    let is_selected = |s: &&Scenario| match names {
+        [] => !s.is_long,
+        names => names.iter().any(|name| name == s.name),
+    };
+    Ok(SCENARIOS.iter().filter(is_selected).collect())
+}

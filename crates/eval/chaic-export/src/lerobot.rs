@@ -1,14 +1,13 @@
 //! Export to version 3 of the LeRobot data set format: a table of frames and a video per episode,
 //! and tables of episodes and tasks.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use chaic_core::{Action, AgentId, EntityId, Frame, Hand, ResolvedAction};
 use chaic_env::Playback;
 use chaic_env::trace::{Decision, Trace};
 use chaic_episodes::Episode;
-use chaic_files::{FileError, create_folders, write_atomically};
+use chaic_files::{create_folders, write_atomically};
 use chaic_render::{Channels, Scene, View};
 use chaic_video::VideoWriter;
 use chaic_world::World;

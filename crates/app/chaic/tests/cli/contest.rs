@@ -127,7 +127,7 @@ fn a_contest_from_end_to_end() {
     assert!(built.contains("page.html: 2 submissions in 2 tables"), "{built}");
     let page = fs::read_to_string(at.join("page.html")).expect("a page");
     assert!(page.contains("A. &lt;b&gt;Author&lt;") && !page.contains("<b>Author"), "{page}");
-    for words in ["difference to RHP", "difference to No helper", "goal place, ids"] {
+    for words in ["difference to RHP", "difference to no helper", "goal place, ids"] {
         assert!(page.contains(words), "{words}: {page}");
     }
     let csv = fs::read_to_string(at.join("page.csv")).expect("values");

@@ -89,7 +89,10 @@ impl TableView {
             heading: format!("{}, {} track", rules.split, rules.track),
             terms: terms(table),
             tasks: rules.tasks.iter().map(|task| task.info().title).collect(),
-            reference: reference.map_or("no helper".to_owned(), title_of),
+            reference: match reference {
+                Some(row) if row.name != NONE => title_of(row),
+                _ => "no helper".to_owned(),
+            },
             rows: table.rows.iter().map(|row| RowView::new(table, row)).collect(),
         }
     }

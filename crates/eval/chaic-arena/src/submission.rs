@@ -97,6 +97,12 @@ impl Submission {
         &self.folder
     }
 
+    /// Returns a message with the name of the user's archive or folder in place of a temporary folder.
+    pub fn with_label(&self, message: &str) -> String {
+        let [folder, label] = [&self.folder, &self.label].map(|path| path.display().to_string());
+        message.replace(&folder, &label)
+    }
+
     /// Returns the manifest.
     pub fn manifest(&self) -> &Manifest {
         &self.manifest
@@ -130,9 +136,8 @@ impl Submission {
         jobs: usize,
         progress: &(dyn Fn(usize) + Sync),
     ) -> Result<VerificationReport> {
-        let [folder, label] = [&self.folder, &self.label].map(|path| path.display().to_string());
         let problem = |problem: String| {
-            refuse(&self.label, format!("`{PUBLIC}`: {}", problem.replace(&folder, &label)))
+            refuse(&self.label, format!("`{PUBLIC}`: {}", self.with_label(&problem)))
         };
         let (run, options) =
             RunFolder::read(&self.public_run()).map_err(|error| problem(error.to_string()))?;

@@ -129,7 +129,10 @@ fn check_submission(
             checks.add(&format!("public run: {traces}, all digests agree"), None)?;
         }
         Ok(Err(error)) => checks.add("public run", Some(error.to_string()))?,
-        Err(error) => checks.add("public run", Some(format!("{error:#}")))?,
+        Err(error) => {
+            let problem = submission.with_label(&format!("{error:#}"));
+            checks.add("public run", Some(problem))?;
+        }
     }
     let n_failed = checks.results.iter().filter(|(_, problem)| problem.is_some()).count();
     let records: Vec<_> = checks

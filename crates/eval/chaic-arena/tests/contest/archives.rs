@@ -106,7 +106,7 @@ fn an_evaluation_keeps_its_submission() {
     let dir = tempfile::tempdir().expect("the disk has space");
     let at = dir.path();
     let other = MANIFEST.replace("\"1.0\"", "\"1.1\"");
-    for (name, manifest) in [("one.tar", MANIFEST), ("two.tar", &other)] {
+    for (name, manifest) in [("one.tar", MANIFEST), ("two.tar", other.as_str())] {
         fs::write(at.join(name), with_manifest(manifest)).expect("the disk has space");
     }
     let evaluation = Evaluation::at(&at.join("result"));

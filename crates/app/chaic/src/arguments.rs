@@ -1,6 +1,7 @@
 //! The command line: commands, options and their help.
 
 mod bench;
+mod contest;
 mod episodes;
 mod eval;
 mod examples;
@@ -24,6 +25,10 @@ use clap::{Args, ColorChoice, Parser, Subcommand, ValueEnum};
 pub use self::bench::{
     BenchCommand, EnvBenchArguments, EnvChoice, GpuAdapter, RenderBenchArguments, ScalingArguments,
     SceneBenchArguments, SceneChoice, SceneCommand, SceneName, WorldBenchArguments,
+};
+pub use self::contest::{
+    LeaderboardBuildArguments, LeaderboardCommand, SubmitCheckArguments, SubmitCommand,
+    SubmitPackArguments, SubmitRunArguments, SubmitScoreArguments, SubmitVerifyArguments,
 };
 pub use self::episodes::{EpisodesCommand, ImportCommand, ImportHalf, OriginalArguments};
 pub use self::eval::{EvalArguments, EvalCommand, LanguageArguments, ModelEvaluation};
@@ -143,6 +148,13 @@ pub enum Command {
     Bench(BenchCommand),
     /// Check this machine: processor, sandbox, weights, writable folders.
     Doctor,
+
+    /// Pack, check, play, score and verify submissions to a contest; docs/arena.md.
+    #[command(subcommand)]
+    Submit(SubmitCommand),
+    /// Compare scored submissions in tables on a page; docs/arena.md.
+    #[command(subcommand)]
+    Leaderboard(LeaderboardCommand),
 
     /// Print a completion script for a shell.
     Completions(CompletionsArguments),

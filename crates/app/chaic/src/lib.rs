@@ -118,6 +118,8 @@ fn run_command(command: Command, format: OutputFormat, launcher: &Launcher) -> R
         Command::Fidelity(arguments) => commands::fidelity::run(&arguments, format),
         Command::Bench(command) => commands::bench::run(&command, format),
         Command::Doctor => commands::doctor::run(format, launcher),
+        Command::Submit(command) => commands::submit::run(&command, format, launcher),
+        Command::Leaderboard(command) => commands::leaderboard::run(&command, format),
         Command::Completions(arguments) => commands::shell::completions(&arguments, format),
         Command::Man(arguments) => commands::shell::man(&arguments, format),
         Command::EvalPerception(PerceptionEvaluation::Detection(arguments)) => {

@@ -24,12 +24,19 @@ pub fn read_bounded(path: &Path, limit: u64) -> Result<Vec<u8>> {
 /// # Errors
 /// If it is no regular file, or the file system refuses.
 pub fn read_user_file(path: &Path, limit: u64) -> Result<Vec<u8>> {
+    read(open_user_file(path)?, path, limit)
+}
+
+/// Opens a file from the user for reading: a regular file, or a link to one.
+///
+/// # Errors
+/// If it is no regular file, or the file system refuses.
+pub fn open_user_file(path: &Path) -> Result<File> {
     let metadata = fs::metadata(path).map_err(FileError::context("open", path))?;
     check_regular(path, EntryKind::from_file_type(metadata.file_type()))?;
     let mut options = File::options();
     let file = without_blocking(&mut options, false).read(true).open(path);
-    let file = check_opened(file.map_err(FileError::context("open", path))?, path)?;
-    read(file, path, limit)
+    check_opened(file.map_err(FileError::context("open", path))?, path)
 }
 
 /// Reads at most the first `limit` bytes of a regular file below `root` without a link in between.

@@ -12,6 +12,7 @@ use hkdf::Hkdf;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use crate::error::ArenaError;
 use crate::secret::{Secret, to_hex};
 
 /// Format of [`Commitment`].
@@ -22,38 +23,6 @@ const VERSION: u32 = 1;
 const DOMAIN: &[u8] = b"chaic sealed split 1";
 /// Maximum number of episodes per task.
 const MAX_PER_TASK: usize = 10_000;
-
-/// Reason why a sealed split cannot be made or opened.
-#[derive(Debug, thiserror::Error)]
-pub enum ArenaError {
-    /// A file operation failed.
-    #[error(transparent)]
-    File(#[from] FileError),
-    /// An episode cannot be generated.
-    #[error(transparent)]
-    Generate(#[from] GenerateError),
-    /// The text is not a commitment.
-    #[error("not a commitment of a sealed split: {0}")]
-    Format(String),
-    /// The commitment is to another secret.
-    #[error(
-        "the secret is not that of the commitment, whose SHA-256 is {expected}; this one's is {found}"
-    )]
-    OtherSecret {
-        /// Digest in the commitment.
-        expected: String,
-        /// Digest of the secret.
-        found: String,
-    },
-    /// The secret is right, but the episodes are not.
-    #[error(
-        "the episodes differ from those of the commitment, which chaic {sealed_by} made; use that version"
-    )]
-    OtherEpisodes {
-        /// Version of chaic in the commitment.
-        sealed_by: String,
-    },
-}
 
 /// Public description of a sealed split, `commitment.json`. It discloses nothing about the episodes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -112,6 +81,21 @@ impl Commitment {
         if expected == found { Ok(split) } else { Err(ArenaError::OtherSecret { expected, found }) }
     }
 
+    /// Checks that these episodes are all those of the commitment, in any order.
+    ///
+    /// # Errors
+    /// [`ArenaError::OtherEpisodes`] if they are not.
+    pub fn check_played(&self, episodes: &[Episode]) -> Result<(), ArenaError> {
+        let rank = |episode: &Episode| self.tasks.iter().position(|task| *task == episode.task());
+        let mut sorted: Vec<&Episode> = episodes.iter().collect();
+        // The numbers of more than 1,000 episodes differ in length.
+        sorted.sort_by_key(|episode| (rank(episode), episode.id().len(), episode.id()));
+        if episodes_sha256(sorted) == self.episodes_sha256 {
+            return Ok(());
+        }
+        Err(ArenaError::OtherEpisodes { sealed_by: self.chaic.clone() })
+    }
+
     /// Checks that this is the commitment to the same episodes.
     ///
     /// # Errors
@@ -122,6 +106,16 @@ impl Commitment {
         }
         Err(ArenaError::OtherEpisodes { sealed_by: self.chaic.clone() })
     }
+}
+
+/// Returns the SHA-256 of episodes, each as one line of JSON, hexadecimal.
+pub(crate) fn episodes_sha256<'a>(episodes: impl IntoIterator<Item = &'a Episode>) -> String {
+    let mut digest = Sha256::new();
+    for episode in episodes {
+        digest.update(episode.to_json_line());
+        digest.update("\n");
+    }
+    to_hex(&digest.finalize())
 }
 
 /// Episodes of the standard split's kind, with seeds from a secret.
@@ -268,6 +262,15 @@ mod tests {
         assert_eq!(read, commitment);
         let opened = read.split(split('2').secret).expect("the committed secret");
         let (other_folder, again) = write(&opened);
+        let mut episodes: Vec<Episode> = opened
+            .tasks
+            .iter()
+            .flat_map(|task| [0, 1].map(|k| opened.episode(*task, k).expect("an episode")))
+            .collect();
+        episodes.reverse();
+        read.check_played(&episodes).expect("the same episodes in another order");
+        episodes.pop();
+        assert!(matches!(read.check_played(&episodes), Err(ArenaError::OtherEpisodes { .. })));
         read.check_episodes(&again).expect("the same episodes");
         for task in TaskId::paper() {
             let name = format!("{task}-001.json");

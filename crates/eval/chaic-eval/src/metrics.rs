@@ -11,17 +11,22 @@ mod formulas;
 mod result;
 mod score;
 mod scores;
+mod significance;
 mod stats;
 mod table;
 mod tally;
 
 pub use accumulators::MetricAccumulator;
 pub use cluster::{Clusters, Environments, Interval};
-pub use differences::{Difference, Resolution, differences, resolution, run_differences};
+pub use differences::{
+    Difference, HelperResults, Resolution, differences, mean_rate, paired_difference, resolution,
+    run_differences,
+};
 pub use formulas::{FormulaSet, Formulas, Spread};
 pub use result::{Delivery, RunResult, RunStatus, Summary};
 pub use score::{MAX_NAMED, Score};
 pub use scores::{PlayedEpisodes, Scores};
+pub use significance::{holm, two_sided_p};
 pub use stats::t_975;
 pub use table::{METRICS, Metric, MetricSource};
 pub use tally::{Tally, tally};

@@ -33,7 +33,8 @@ const LEVEL: u8 = 9;
 const MODULE: &[u8] = include_bytes!("../bundle/chaic_web.wasm.deflate");
 const WORKER: &str = include_str!("../bundle/worker.js");
 const SCRIPT: &str = include_str!("../bundle/page.js");
-const STYLE: &str = include_str!("page.css");
+/// Style of all pages (CSS), for light and dark displays.
+pub const STYLE: &str = include_str!("page.css");
 /// The ending selects escaping for HTML.
 const TEMPLATE: (&str, &str) = ("page.html", include_str!("page.html"));
 
@@ -106,8 +107,8 @@ impl PageReplay {
     }
 }
 
-/// Returns a link to a text file that is part of the page.
-fn data_link(media_type: &str, text: &str) -> String {
+/// Returns a link (data URL) to a text file that is part of a page.
+pub fn data_link(media_type: &str, text: &str) -> String {
     format!("data:{media_type};base64,{}", STANDARD.encode(text))
 }
 

@@ -1,6 +1,7 @@
 //! Examples in the long help of each command, in a file for each group of commands. A test parses all of them.
 
 mod check;
+mod contest;
 mod learn;
 mod look;
 mod play;
@@ -22,5 +23,7 @@ const ROOT: &[CommandExamples] = &[(
 
 /// Returns all commands with their examples.
 pub(super) fn examples() -> impl Iterator<Item = &'static CommandExamples> {
-    [ROOT, play::EXAMPLES, look::EXAMPLES, learn::EXAMPLES, check::EXAMPLES].into_iter().flatten()
+    [ROOT, play::EXAMPLES, look::EXAMPLES, learn::EXAMPLES, check::EXAMPLES, contest::EXAMPLES]
+        .into_iter()
+        .flatten()
 }

@@ -8,11 +8,12 @@ use super::Arguments;
 use super::examples::examples;
 
 /// Headings of `chaic --help` with their commands. Hidden commands have no group.
-pub(super) const GROUPS: [(&str, &[&str]); 5] = [
+pub(super) const GROUPS: [(&str, &[&str]); 6] = [
     ("Play", &["eval", "merge", "play", "episodes", "import", "helper", "llm"]),
     ("Look", &["report", "show", "list", "explain", "replay", "view", "render", "scene"]),
     ("Learn", &["collect", "train", "export"]),
     ("Check", &["verify", "fidelity", "bench", "doctor"]),
+    ("Contest", &["submit", "leaderboard"]),
     ("Shell", &["completions", "man", "help"]),
 ];
 const EXIT_CODES: &str = "Exit codes: 0 success, 1 failure or a reported problem, 2 invalid request, \

@@ -64,9 +64,8 @@ pub(super) fn open(
     out: &Path,
     format: OutputFormat,
 ) -> Result<ExitStatus> {
-    let bytes = read_user_file(commitment_path, MAX_COMMITMENT_BYTES)?;
     let name = commitment_path.display().to_string();
-    let commitment = Commitment::parse(&bytes).with_context(|| name.clone())?;
+    let commitment = read_commitment(commitment_path)?;
     let split = commitment.split(Secret::read(secret_path)?).with_context(|| name.clone())?;
     let Some(opened) = write_episodes(&split, out)? else {
         return Ok(ExitStatus::Interrupted);
@@ -81,6 +80,15 @@ pub(super) fn open(
     );
     print_result(format, &json, &text)?;
     Ok(ExitStatus::Success)
+}
+
+/// Reads a published commitment.
+///
+/// # Errors
+/// If the file cannot be read, or holds no commitment.
+pub(super) fn read_commitment(path: &Path) -> Result<Commitment> {
+    let bytes = read_user_file(path, MAX_COMMITMENT_BYTES)?;
+    Commitment::parse(&bytes).with_context(|| path.display().to_string())
 }
 
 /// Writes the episodes of a split. Returns `None` if the user stopped it.

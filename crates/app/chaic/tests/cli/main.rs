@@ -7,6 +7,7 @@ use std::process::{Child, Command, Output, Stdio};
 use assert_cmd::cargo::cargo_bin;
 
 mod beliefs;
+mod contest;
 mod files;
 mod help;
 mod interrupted;

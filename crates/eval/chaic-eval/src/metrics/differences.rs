@@ -61,6 +61,43 @@ pub fn run_differences(played: PlayedEpisodes<'_>, baseline: &[RunResult]) -> Ve
     pairs.filter(|(_, n_episodes)| *n_episodes > 0).map(|(difference, _)| difference).collect()
 }
 
+/// Results of one helper, which may come from a run of its own.
+#[derive(Clone, Copy, Debug)]
+pub struct HelperResults<'a> {
+    /// Results of the run.
+    pub results: &'a [RunResult],
+    /// Name of the helper in the run.
+    pub helper: &'a str,
+}
+
+/// Computes the paired difference between two helpers of any runs, as [`differences`] does.
+pub fn paired_difference(
+    a: HelperResults<'_>,
+    b: HelperResults<'_>,
+    environments: &Environments,
+) -> Difference {
+    let (groups, baseline_groups) = (grouped(a.results), grouped(b.results));
+    difference((&groups, a.helper), (&baseline_groups, b.helper), environments).0
+}
+
+/// Returns the mean transport rate of a helper over the episodes of all tasks, and its 95 % interval
+/// over environments if there are enough of them; `None` without results. Seeds are averaged, and
+/// failed runs count as zero.
+pub fn mean_rate(
+    HelperResults { results, helper }: HelperResults<'_>,
+    environments: &Environments,
+) -> Option<(f64, Option<Interval>)> {
+    let groups = grouped(results);
+    let mut all = Clusters::default();
+    for (task, by_helper) in &groups {
+        let Some(episodes) = by_helper.get(helper) else { continue };
+        for (episode, runs) in episodes {
+            all.add(*task, environments.get(episode), over_seeds(runs, Summary::rate));
+        }
+    }
+    Some((all.mean()?, all.interval()))
+}
+
 /// Compares two helpers, each with the results of its run, on the episodes that both have; also
 /// returns the number of these episodes.
 fn difference(

@@ -20,3 +20,10 @@ pub fn t_975(df: usize) -> f64 {
     let Ok(t) = StudentsT::new(0.0, 1.0, df as f64) else { return f64::INFINITY };
     (1e3 * t.inverse_cdf(0.975)).round() / 1e3
 }
+
+/// Returns the two-sided p-value of Student's t for `df` degrees of freedom, rounded to six decimals, so
+/// that it is the same number on every machine.
+pub fn two_sided_t(t: f64, df: usize) -> f64 {
+    let Ok(distribution) = StudentsT::new(0.0, 1.0, df as f64) else { return 1.0 };
+    (1e6 * 2.0 * distribution.cdf(-t.abs())).round() / 1e6
+}

@@ -1,0 +1,148 @@
+//! The helper of a submission: a program in the sandbox, a policy or a built-in helper.
+//!
+//! **Invariant:** a submission decides which of its own files are read, and which installed program runs. It
+//! cannot make any other file readable for its helper.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use anyhow::{Result, bail};
+use chaic_arena::{HelperSource, Submission};
+use chaic_env::helper_registry::{BuiltInWithPerception, HelperRegistry, find};
+use chaic_env::rules::{RuleSet, RuleSetName};
+use chaic_eval::EvalError;
+use chaic_learn::helpers::{NamedPolicy, PolicyRegistry};
+use chaic_sandbox::Launcher;
+use chaic_subprocess::{CommandRegistry, Confinement, ConfinementOptions, HelperProgram, Limits};
+
+use super::run_perception::perception_by_name;
+use crate::output::{print_warning, quoted};
+
+/// Helpers of a run with a submission.
+pub(super) struct SubmittedHelpers {
+    built_in: BuiltInWithPerception,
+    program: Option<HelperProgram>,
+    policy: Option<(String, PathBuf)>,
+    stop: &'static AtomicBool,
+}
+
+impl SubmittedHelpers {
+    /// Prepares the helper of a submission. Its processes cannot read the folders `masked`.
+    ///
+    /// # Errors
+    /// If the sandbox does not start, or the perception cannot be loaded.
+    pub fn new(
+        submission: &Submission,
+        masked: &[PathBuf],
+        launcher: &Launcher,
+        stop: &'static AtomicBool,
+    ) -> Result<SubmittedHelpers> {
+        let manifest = submission.manifest();
+        let play = &manifest.play;
+        let perception = perception_by_name(Some(&play.perception), Some(&play.behavior))?;
+        let built_in = BuiltInWithPerception { perception };
+        let mut helpers = SubmittedHelpers { built_in, program: None, policy: None, stop };
+        match &manifest.helper {
+            HelperSource::BuiltIn(_) => {}
+            HelperSource::Policy(path) => {
+                let path = submission.helper_folder().join(path);
+                helpers.policy = Some((manifest.name.clone(), path));
+            }
+            HelperSource::Command(words) => {
+                helpers.program = Some(program(submission, words, masked, launcher)?);
+            }
+        }
+        Ok(helpers)
+    }
+
+    /// Returns the program of the submission, if it has one.
+    pub fn program(&self) -> Option<&HelperProgram> {
+        self.program.as_ref()
+    }
+
+    /// Passes the registry of these helpers to a function.
+    ///
+    /// # Errors
+    /// Those of the function; if the policy cannot be read, or the name of the helper is taken.
+    pub fn with_registry<T>(
+        &self,
+        play: impl FnOnce(&dyn HelperRegistry) -> Result<T>,
+    ) -> Result<T> {
+        let perception = Arc::clone(&self.built_in.perception);
+        let policies: chaic_env::Result<Vec<NamedPolicy>> =
+            self.policy.iter().map(|(name, file)| NamedPolicy::read(name, file)).collect();
+        let policies =
+            PolicyRegistry::bundled(&self.built_in, perception).with_policies(policies?)?;
+        let programs = self.program.clone().into_iter().collect();
+        play(&CommandRegistry::new(&policies, programs, self.stop)?)
+    }
+
+    /// Checks that the helper requests the grants of the manifest.
+    ///
+    /// # Errors
+    /// If it requests others, or there is no helper of its name.
+    pub fn check_grants(&self, submission: &Submission) -> Result<()> {
+        let manifest = submission.manifest();
+        let rules = RuleSet::named(RuleSetName::Paper).planner;
+        let grants = self.with_registry(|helpers| {
+            Ok(find(helpers, &manifest.name, rules)?.map(|helper| helper.grants))
+        })?;
+        if grants == Some(manifest.play.grants) {
+            return Ok(());
+        }
+        let requested = grants.map_or(Vec::new(), |grants| {
+            grants.names_beyond(chaic_core::observation::Grants::NONE)
+        });
+        bail!(
+            "{} requests the grants [{}], which submission.toml must list in `play.grants`",
+            manifest.name,
+            requested.join(", ")
+        )
+    }
+}
+
+/// Returns the program of a submission in its sandbox.
+fn program(
+    submission: &Submission,
+    words: &[String],
+    masked: &[PathBuf],
+    launcher: &Launcher,
+) -> Result<HelperProgram> {
+    let manifest = submission.manifest();
+    let folder = std::path::absolute(submission.helper_folder())?;
+    let Some(folder_text) = folder.to_str() else {
+        let text = format!("{} is not UTF-8; choose another folder", folder.display());
+        return Err(EvalError::Options(text).into());
+    };
+    let words: Vec<String> = words.iter().map(|word| quoted(word).into_owned()).collect();
+    let line = format!("cd {} && exec {}", quoted(folder_text), words.join(" "));
+    let limits = Limits::default();
+    let options = ConfinementOptions {
+        is_trusted: false,
+        readable: vec![folder.clone()],
+        masked: masked.to_vec(),
+    };
+    let installed = installed_program(&words[0]);
+    let confinement = Confinement::new(launcher, installed, &limits, &options)?;
+    if let Some(missing) = confinement.warning() {
+        print_warning(&format!("{} runs in {missing}", manifest.name));
+    }
+    Ok(HelperProgram {
+        name: manifest.name.clone(),
+        line,
+        grants: manifest.play.grants,
+        limits,
+        environment: Vec::new(),
+        confinement: Some(confinement),
+    })
+}
+
+/// Returns the word by which the sandbox finds the installation of a program; empty if the word is a path.
+///
+/// The sandbox opens every file that a command line names, together with its folder. Words of a submission
+/// could name files of the organizer.
+fn installed_program(word: &str) -> &str {
+    let is_name = word.chars().all(|c| c.is_ascii_alphanumeric() || "._-+".contains(c));
+    if is_name && !Path::new(word).exists() { word } else { "" }
+}

@@ -1,0 +1,225 @@
+//! Promises on contests: a submission is checked, played, scored and verified by the documented commands. An altered
+//! trace or score is found, and keeps its submission out of the leaderboard. A submission reads its own files only.
+
+use std::fs;
+use std::path::Path;
+use std::process::Output;
+
+use assert_cmd::cargo::cargo_bin;
+
+use super::{command, run_ok, short_episodes, shorten, text};
+
+/// Runs `chaic` with its own folder in the search path, so that a submission can name it as an installed program.
+fn output_of(at: &Path, arguments: &[&str]) -> Output {
+    let program = cargo_bin!("chaic").to_path_buf();
+    let own = program.parent().expect("a folder").to_owned();
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let folders = std::iter::once(own).chain(std::env::split_paths(&path));
+    let path = std::env::join_paths(folders).expect("they were joined before");
+    let out = command(at, arguments).env("PATH", path).output().expect("the command starts");
+    let stderr = text(&out.stderr);
+    assert!(!stderr.contains("panicked"), "{arguments:?}: {stderr}");
+    out
+}
+
+fn succeed(at: &Path, arguments: &[&str]) -> String {
+    let out = output_of(at, arguments);
+    assert!(out.status.success(), "{arguments:?}: {}{}", text(&out.stdout), text(&out.stderr));
+    text(&out.stdout)
+}
+
+/// Runs a command that must report a problem; returns its output.
+fn fail(at: &Path, arguments: &[&str]) -> String {
+    let out = output_of(at, arguments);
+    assert_eq!(out.status.code(), Some(1), "{arguments:?}: {}", text(&out.stdout));
+    text(&out.stdout) + &text(&out.stderr)
+}
+
+/// Writes the manifest of a submission.
+fn write_manifest(folder: &Path, name: &str, helper: &str, grants: &str) {
+    fs::create_dir_all(folder).expect("the disk has space");
+    let manifest = format!(
+        "version = 1\nname = \"{name}\"\nrelease = \"1.0\"\nauthors = [\"A. <b>Author</b>\"]\n\
+         license = \"MIT\"\ndescription = \"Random valid plans.\"\nchaic = \"{}\"\n\
+         [helper]\n{helper}\n[play]\ngrants = [{grants}]\n\
+         [training]\nhardware = \"none\"\ncore_hours = 0\n\
+         [public]\nsplit = \"standard\"\ntasks = [\"no_constraint\"]\nn_episodes = 1\n",
+        env!("CARGO_PKG_VERSION")
+    );
+    fs::write(folder.join("submission.toml"), manifest).expect("the disk has space");
+}
+
+const GRANTS: &str = "\"ids\", \"goal_place\"";
+
+/// Arguments of a public run.
+const PUBLIC: [&str; 9] =
+    ["eval", "--split", "standard", "--task", "no_constraint", "--n-episodes", "1", "--size", "32"];
+
+/// Writes the submission of a program, `mine`, with its public run.
+fn write_program(at: &Path) {
+    let command = r#"command = ["chaic", "helper", "serve", "random"]"#;
+    write_manifest(&at.join("mine"), "mine", command, GRANTS);
+    fs::create_dir_all(at.join("mine/helper")).expect("the disk has space");
+    fs::write(at.join("mine/helper/NOTES"), "The program is installed.").expect("it has space");
+    let helper = ["--helper", "none,mine=exec:chaic helper serve random"];
+    let more = ["--exec-grants", "ids,goal_place", "--out", "mine/public"];
+    succeed(at, &[&PUBLIC[..], &helper, &more].concat());
+}
+
+/// Writes the submission of the built-in helper `random`, with its public run.
+fn write_built_in(at: &Path) {
+    write_manifest(&at.join("other"), "random", "built_in = \"random\"", GRANTS);
+    let helper = ["--helper", "none,random", "--out", "other/public"];
+    succeed(at, &[&PUBLIC[..], &helper].concat());
+}
+
+/// Replaces a part of a text file; returns the earlier content.
+fn replace(path: &Path, from: &str, to: &str) -> String {
+    let whole = fs::read_to_string(path).expect("a text file");
+    assert!(whole.contains(from), "{from}");
+    fs::write(path, whole.replacen(from, to, 1)).expect("the disk has space");
+    whole
+}
+
+#[test]
+fn a_contest_from_end_to_end() {
+    let dir = short_episodes();
+    let at = dir.path();
+    write_program(at);
+    let checked = succeed(at, &["submit", "check", "mine"]);
+    for words in ["ok      archive, SHA-256 ", "it exits after `bye`", "public run: 2 traces"] {
+        assert!(checked.contains(words), "{words}: {checked}");
+    }
+    for name in ["mine.tar", "again.tar"] {
+        succeed(at, &["submit", "pack", "mine", "--out", name]);
+    }
+    let [first, again] = ["mine.tar", "again.tar"].map(|name| fs::read(at.join(name)));
+    assert!(first.expect("an archive") == again.expect("an archive"));
+
+    let play = ["submit", "run", "mine.tar", "--rhp", "--out", "results/mine", "--episodes"];
+    let unscored = fail(at, &["submit", "score", "results/mine"]);
+    assert!(unscored.contains("results/mine"), "{unscored}");
+    let played = succeed(at, &[&play[..], &["short"]].concat());
+    assert!(played.contains("results/mine/run: 6 episode runs"), "{played}");
+    let journal = fs::read(at.join("results/mine/run/results.jsonl")).expect("results");
+    succeed(at, &[&play[..], &["short"]].concat());
+    assert!(fs::read(at.join("results/mine/run/results.jsonl")).expect("results") == journal);
+
+    succeed(at, &["submit", "score", "results/mine"]);
+    succeed(at, &["submit", "score", "results/mine", "--out", "again.json"]);
+    let score_path = at.join("results/mine/score.json");
+    let score = fs::read_to_string(&score_path).expect("a score");
+    assert_eq!(score, fs::read_to_string(at.join("again.json")).expect("a score"));
+    assert!(!score.contains(&at.display().to_string()), "a score has no paths");
+    let confirmed = succeed(at, &["submit", "verify", "results/mine"]);
+    assert!(confirmed.contains("confirmed by 6 traces"), "{confirmed}");
+
+    // A second submission plays other episodes, so it is in another table.
+    write_built_in(at);
+    let generate = ["episodes", "generate", "--task", "no_constraint", "--seeds", "5..6"];
+    run_ok(at, &[&generate[..], &["--out", "short2"]].concat());
+    shorten(&at.join("short2"));
+    let play = ["submit", "run", "other", "--out", "results/other", "--episodes", "short2"];
+    succeed(at, &play);
+    succeed(at, &["submit", "score", "results/other"]);
+    let build = ["leaderboard", "build", "results", "--out"];
+    let built = succeed(at, &[&build[..], &["page.html"]].concat());
+    assert!(built.contains("page.html: 2 submissions in 2 tables"), "{built}");
+    let page = fs::read_to_string(at.join("page.html")).expect("a page");
+    assert!(page.contains("A. &lt;b&gt;Author&lt;") && !page.contains("<b>Author"), "{page}");
+    for words in ["difference to RHP", "difference to no helper", "goal place, ids"] {
+        assert!(page.contains(words), "{words}: {page}");
+    }
+    let csv = fs::read_to_string(at.join("page.csv")).expect("values");
+    assert_eq!(csv.lines().count(), 1 + 3 + 2, "{csv}");
+    succeed(at, &[&build[..], &["page2.html"]].concat());
+    for kind in ["html", "json", "csv"] {
+        let [a, b] = ["page", "page2"].map(|name| fs::read(at.join(format!("{name}.{kind}"))));
+        assert!(a.expect("a file") == b.expect("a file"), "{kind}");
+    }
+
+    // One byte of one trace.
+    let trace = at.join("results/mine/run/traces/no_constraint/mine/gen-0-s0.jsonl");
+    let whole = replace(&trace, "\"turn_left\"", "\"turn_right\"");
+    let problem = fail(at, &["submit", "verify", "results/mine"]);
+    assert!(problem.contains("DIFFERS ") && problem.contains("gen-0-s0.jsonl"), "{problem}");
+    let built = fail(at, &[&build[..], &["page.html"]].concat());
+    assert!(built.contains("REFUSED mine: run/traces/no_constraint/mine/gen-0"), "{built}");
+    assert!(built.contains("page.html: 1 submission in 1 table"), "{built}");
+    let page = fs::read_to_string(at.join("page.html")).expect("a page");
+    assert!(page.contains("Refused submissions") && page.contains("<b>mine</b>"), "{page}");
+    fs::write(&trace, whole).expect("the disk has space");
+
+    let whole = replace(&score_path, "\"tr\": ", "\"tr\": 1");
+    let problem = fail(at, &["submit", "verify", "results/mine/score.json"]);
+    assert!(problem.contains("score.json: line "), "{problem}");
+    fs::write(&score_path, whole).expect("the disk has space");
+    let seal = ["episodes", "seal", "--secret", "secret", "--task", "shopping", "--n-episodes"];
+    run_ok(at, &[&seal[..], &["1", "--out", "sealed"]].concat());
+    let commitment = ["--commitment", "sealed/commitment.json"];
+    let problem = fail(at, &[&["submit", "verify", "results/mine"], &commitment[..]].concat());
+    assert!(problem.contains("the episodes differ from those of the commitment"), "{problem}");
+    succeed(at, &["submit", "verify", "results/mine"]);
+}
+
+#[test]
+fn a_public_run_must_be_that_of_the_manifest() {
+    let dir = tempfile::tempdir().expect("the disk has space");
+    let at = dir.path();
+    write_built_in(at);
+    let checked = succeed(at, &["submit", "check", "other"]);
+    assert!(checked.contains("the built-in helper has the grants of the manifest"), "{checked}");
+    let manifest = at.join("other/submission.toml");
+    for (from, to, words) in [
+        (
+            GRANTS,
+            "\"ids\"",
+            "random plays with the grants ids, goal_place, but submission.toml has",
+        ),
+        ("n_episodes = 1", "n_episodes = 2", "the number of episodes of the run is `1`, but"),
+        ("\"standard\"", "\"test\"", "the split of the run is `standard`, but"),
+        ("[\"no_constraint\"]", "[\"shopping\"]", "the tasks of the run is `no_constraint`, but"),
+    ] {
+        let whole = replace(&manifest, from, to);
+        let problem = fail(at, &["submit", "check", "other"]);
+        assert!(problem.contains("FAILED  public run") && problem.contains(words), "{problem}");
+        fs::write(&manifest, whole).expect("the disk has space");
+    }
+    let trace = at.join("other/public/traces/no_constraint/random/standard-000-s0.jsonl");
+    let whole = replace(&trace, "\"turn_left\"", "\"turn_right\"");
+    let problem = fail(at, &["submit", "check", "other"]);
+    assert!(problem.contains("`public`: other/public/traces/"), "{problem}");
+    fs::write(&trace, whole).expect("the disk has space");
+    fs::remove_dir_all(at.join("other/public")).expect("it exists");
+    let problem = fail(at, &["submit", "check", "other"]);
+    assert!(problem.contains("no run.json"), "{problem}");
+}
+
+#[test]
+fn a_submission_reads_its_own_files_only() {
+    let dir = short_episodes();
+    let at = dir.path();
+    fs::write(at.join("secret"), "sesame-open").expect("the disk has space");
+    let secret = at.join("secret").display().to_string();
+    // The command names the secret, so that the sandbox would open it for a command of the user.
+    let line = format!(r#"command = ["sh", "spy.sh", "{secret}", "secret"]"#);
+    write_manifest(&at.join("spy"), "spy", &line, "");
+    fs::create_dir_all(at.join("spy/helper")).expect("the disk has space");
+    let script = "cat words; cat \"$@\" ../../run/run.json ../submission.toml; exit 1";
+    fs::write(at.join("spy/helper/spy.sh"), format!("{{ {script}; }} >&2")).expect("it has space");
+    fs::write(at.join("spy/helper/words"), "words-are-here").expect("the disk has space");
+    let played = ["submit", "run", "spy", "--episodes", "short", "--out", "results/spy"];
+    let message = fail(at, &played);
+    assert!(message.contains("failed, zero each: 2"), "{message}");
+    let results = fs::read_to_string(at.join("results/spy/run/results.jsonl")).expect("results");
+    assert!(results.contains("words-are-here"), "{results}");
+    let run = fs::read_to_string(at.join("results/spy/run/run.json")).expect("a run");
+    if run.contains(r#""spy": "sandbox""#) {
+        for hidden in ["sesame", "renderer", "A. <b>Author"] {
+            assert!(!results.contains(hidden), "{hidden}: {results}");
+        }
+    }
+    // Failed runs score zero, and the score is confirmed.
+    succeed(at, &["submit", "score", "results/spy"]);
+    succeed(at, &["submit", "verify", "results/spy"]);
+}

@@ -98,12 +98,27 @@ pub fn create_or_replace(path: &Path) -> io::Result<OutputFile> {
     create(path, File::options().write(true))
 }
 
-/// Creates an empty file like [`create_or_replace`], which only its owner may read.
+/// Creates an empty file like [`create_or_replace`], which may be executed on Unix.
+///
+/// # Errors
+/// Those of [`create_or_replace`].
+pub fn create_executable(path: &Path) -> io::Result<OutputFile> {
+    create_with_mode(path, 0o755)
+}
+
+/// Creates an empty file like [`create_or_replace`], which only its owner may read on Unix.
 pub(crate) fn create_private(path: &Path) -> io::Result<OutputFile> {
+    create_with_mode(path, 0o600)
+}
+
+/// Creates an empty file with Unix permissions.
+fn create_with_mode(path: &Path, mode: u32) -> io::Result<OutputFile> {
     let mut options = File::options();
     options.write(true);
     #[cfg(unix)]
-    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, mode);
+    #[cfg(not(unix))]
+    let _ = mode;
     create(path, &mut options)
 }
 

@@ -11,11 +11,13 @@ mod scan;
 pub use entry_path::check_path;
 pub use pack::{PackedArchive, content_sha256, pack};
 
-use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::Path;
 
-use chaic_files::{EntryKind, FileError, create_folders_below, kind};
+use chaic_files::{
+    EntryKind, FileError, create_executable, create_folders, create_folders_below,
+    create_or_replace, kind, remove_folder, rename,
+};
 
 use crate::error::{ArenaError, Result};
 use scan::{Destination, Scan};
@@ -48,16 +50,16 @@ pub fn extract(archive: &Path, target: &Path) -> Result<()> {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
-    fs::create_dir_all(parent).map_err(FileError::context("make the folder", parent))?;
+    create_folders(parent)?;
     let temporary = tempfile::Builder::new().prefix(".chaic-extract-").tempdir_in(parent);
     let temporary = temporary.map_err(FileError::context("make a folder in", parent))?;
     Scan::open(archive)?.run(&mut Folder { root: temporary.path() })?;
     make_readable(temporary.path())?;
     let path = temporary.keep();
-    fs::rename(&path, target).map_err(|error| {
+    rename(&path, target).map_err(|error| {
         // If the removal fails too, the prefix marks the folder as temporary.
-        let _ = fs::remove_dir_all(&path);
-        FileError::context("extract into", target)(error).into()
+        let _ = remove_folder(&path);
+        error.into()
     })
 }
 
@@ -87,17 +89,8 @@ impl Destination for Folder<'_> {
     fn file(&mut self, path: &str, is_executable: bool) -> Result<Box<dyn Write>> {
         let path = self.root.join(path);
         create_folders_below(self.root, path.parent().unwrap_or(self.root))?;
-        let mut options = File::options();
-        // O_EXCL neither follows a link nor replaces a file.
-        options.write(true).create_new(true);
-        #[cfg(unix)]
-        {
-            let mode = if is_executable { 0o755 } else { 0o644 };
-            std::os::unix::fs::OpenOptionsExt::mode(&mut options, mode);
-        }
-        #[cfg(not(unix))]
-        let _ = is_executable;
-        let file = options.open(&path).map_err(FileError::context("create", &path))?;
+        let file = if is_executable { create_executable(&path) } else { create_or_replace(&path) };
+        let file = file.map_err(FileError::context("create", &path))?;
         Ok(Box::new(io::BufWriter::new(file)))
     }
 }
@@ -107,8 +100,8 @@ fn make_readable(folder: &Path) -> Result<()> {
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt as _;
-        let permissions = fs::Permissions::from_mode(0o755);
-        fs::set_permissions(folder, permissions)
+        let permissions = std::fs::Permissions::from_mode(0o755);
+        std::fs::set_permissions(folder, permissions)
             .map_err(FileError::context("set the permissions of", folder))?;
     }
     #[cfg(not(unix))]

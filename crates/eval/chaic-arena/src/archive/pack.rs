@@ -1,12 +1,11 @@
 //! Packing of folders: the same content gives the same bytes.
 
-use std::fs;
 use std::io::{self, BufWriter, Read as _, Write};
 use std::path::Path;
 
 use chaic_files::{
-    Entry, EntryKind, FileError, LOCK, TEMPORARY_SUFFIX, create_or_replace, open_file, walk,
-    with_suffix,
+    Entry, EntryKind, FileError, LOCK, TEMPORARY_SUFFIX, create_or_replace, open_file, remove_file,
+    rename, walk, with_suffix,
 };
 use sha2::{Digest as _, Sha256};
 use tar::{EntryType, Header};
@@ -46,12 +45,12 @@ pub fn pack(folder: &Path, archive: &Path) -> Result<PackedArchive> {
         let file = inner.into_inner().map_err(io::IntoInnerError::into_error);
         let synced = file.and_then(|file| file.sync_all());
         synced.map_err(FileError::context("write", &temporary))?;
-        fs::rename(&temporary, archive).map_err(FileError::context("write", archive))?;
+        rename(&temporary, archive)?;
         Ok(PackedArchive { n_files, bytes, sha256: to_hex(&digest.finalize()) })
     });
     if packed.is_err() {
         // If the removal fails too, the suffix marks the file as temporary.
-        let _ = fs::remove_file(&temporary);
+        let _ = remove_file(&temporary);
     }
     packed
 }

@@ -135,7 +135,7 @@ fn write_archive(folder: &Path, output: &mut dyn Write) -> Result<usize> {
 
 /// Returns the size of a file, and whether its owner may execute it.
 fn attributes(path: &Path) -> Result<(u64, bool)> {
-    let metadata = fs::symlink_metadata(path).map_err(FileError::context("open", path))?;
+    let metadata = std::fs::symlink_metadata(path).map_err(FileError::context("open", path))?;
     #[cfg(unix)]
     let is_executable =
         std::os::unix::fs::PermissionsExt::mode(&metadata.permissions()) & 0o100 != 0;

@@ -10,6 +10,7 @@ use chaic_env::{AgentSlot, Env, EpisodeAgents, EpisodeConfig, RunKey};
 use chaic_episodes::{Episode, find_episode};
 use chaic_llm::exchange::{ChatRequest, Exchange, Message, Purpose, Reply, Role, Usage};
 use chaic_llm::record::{RecordEntry, RecordHeader};
+use chaic_llm::templates::Templates;
 use chaic_nn::{Kernel, Network, weights};
 use chaic_subprocess::frame::MessageFrame;
 use chaic_subprocess::message::{PROTOCOL, RequestMessage, observation_frame};
@@ -30,6 +31,8 @@ pub struct Inputs {
     pub run: PathBuf,
     /// Commitment to a sealed split.
     commitment: PathBuf,
+    /// Windows of an opponent model.
+    windows: PathBuf,
     /// Episode of [`Inputs::trace`].
     pub episode: Episode,
 }
@@ -51,7 +54,12 @@ impl Inputs {
             &words("episodes seal --secret s --task shopping --n-episodes 1 --out seal"),
         )?;
         let commitment = folder.join("seal/commitment.json");
-        Ok(Inputs { scratch, run: folder.join("run"), commitment, episode })
+        run_ok(
+            folder,
+            &words("collect opponent --out w --of-each 1 --episodes 1 --image-size 16"),
+        )?;
+        let (run, windows) = (folder.join("run"), folder.join("w"));
+        Ok(Inputs { scratch, run, commitment, windows, episode })
     }
 
     /// Reads a file of the run.
@@ -60,6 +68,24 @@ impl Inputs {
     /// If it does not exist.
     pub fn file(&self, name: &str) -> Result<Vec<u8>> {
         fs::read(self.run.join(name)).with_context(|| format!("the run has no {name}"))
+    }
+
+    /// Returns windows of an opponent model.
+    ///
+    /// # Errors
+    /// If there are none.
+    pub fn windows(&self) -> Result<Vec<u8>> {
+        fs::read(&self.windows).context("no windows")
+    }
+
+    /// Returns a template of a prompt.
+    ///
+    /// # Errors
+    /// If the templates cannot be written.
+    pub fn template(&self) -> Result<Vec<Vec<u8>>> {
+        let folder = self.scratch.join("built_in");
+        Templates::load(None)?.write(&folder)?;
+        Ok(vec![fs::read(folder.join("ask_text.txt"))?])
     }
 
     /// Returns the commitment to a sealed split.

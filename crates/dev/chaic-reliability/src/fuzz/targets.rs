@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use anyhow::Result;
 use chaic_arena::{Commitment, Secret};
+use chaic_core::Action;
 use chaic_env::trace;
 use chaic_env::{NoopAgent, Playback};
 use chaic_episodes::Episode;
@@ -25,7 +26,7 @@ use chaic_llm::templates::Templates;
 use chaic_llm::{Settings, answer};
 use chaic_nn::weights;
 use chaic_subprocess::frame::{MAX_BODY, MessageFrame};
-use chaic_subprocess::message::ResponseMessage;
+use chaic_subprocess::message::{PROTOCOL, ResponseMessage, SensorRequest};
 use chaic_subprocess::serve::serve;
 use chaic_training::checkpoint::{Checkpoint, Identity, MAGIC};
 use chaic_training::{Trainer, parse_config};
@@ -33,7 +34,6 @@ use chaic_vision::behavior::network::TrainedBehavior;
 use chaic_vision::behavior::train::BehaviorTrainer;
 use chaic_vision::train::DetectorLearner;
 use chaic_vision::trained::TrainedDetector;
-use serde_json::json;
 use xxhash_rust::xxh3::xxh3_128;
 
 use super::inputs::{self, Inputs, KIND};
@@ -79,7 +79,7 @@ pub const TARGETS: [Target; 17] = [
     },
     target("training-config", Format::Text, |_| Ok(training_configs()), training_config),
     target("llm-config", Format::Text, |_| Ok(llm_configs()), llm_config),
-    target("llm-templates", Format::Text, |_| Ok(templates()), llm_templates),
+    target("llm-templates", Format::Text, |inputs| inputs.template(), llm_templates),
     target("llm-reply", Format::Json, |_| Ok(inputs::replies()), llm_reply),
     target("llm-answer", Format::Text, |_| Ok(inputs::answers()), llm_answer),
     target("llm-record", Format::JsonLines, |_| Ok(vec![inputs::record()]), llm_record),
@@ -98,7 +98,7 @@ pub const TARGETS: [Target; 17] = [
     },
     Target {
         repair: repair_weights,
-        ..target("windows", Format::Binary, |_| Ok(vec![inputs::weights_file()]), windows)
+        ..target("windows", Format::Binary, |inputs| Ok(vec![inputs.windows()?]), windows)
     },
     target("commitment", Format::Json, |inputs| Ok(vec![inputs.commitment()?]), commitment),
     target("secret", Format::Binary, |_| Ok(vec![[b'a'; 64].to_vec()]), secret),
@@ -188,7 +188,12 @@ fn training_config(_: &Inputs, bytes: &[u8]) -> Result<(), String> {
         parse_config::<DetectorLearner>(config).map(drop),
         parse_config::<BehaviorTrainer>(config).map(drop),
     ];
-    parsed.into_iter().collect()
+    let Some(errors) = parsed.into_iter().map(Result::err).collect::<Option<Vec<String>>>() else {
+        return Ok(());
+    };
+    // The message of the training that the input fits best; any of several lines is a fault.
+    let score = |error: &String| (error.contains('\n'), !error.contains("unknown field"));
+    Err(errors.into_iter().max_by_key(score).unwrap_or_default())
 }
 
 fn training_configs() -> Vec<Vec<u8>> {
@@ -213,8 +218,10 @@ fn llm_config(inputs: &Inputs, bytes: &[u8]) -> Result<(), String> {
 fn llm_configs() -> Vec<Vec<u8>> {
     let mut settings = Settings::default();
     settings.asking.model = "m".to_owned();
+    settings.endpoint.url = "http://localhost:8000/v1".to_owned();
     let text = toml::to_string(&settings).expect("settings serialize to TOML");
-    vec![text.into(), b"[asking]\nmodel = \"m\"\n[asking.extra]\ntop_k = 5\n".to_vec()]
+    let extra = "[asking.extra]\ntop_k = 5\nstop = [\"a\", \"b\"]\n";
+    vec![text.clone().into(), format!("{text}{extra}").into()]
 }
 
 fn llm_templates(inputs: &Inputs, bytes: &[u8]) -> Result<(), String> {
@@ -222,14 +229,6 @@ fn llm_templates(inputs: &Inputs, bytes: &[u8]) -> Result<(), String> {
     fs::create_dir_all(&folder).expect("the scratch folder is writable");
     file(inputs, "templates/ask_text.txt", bytes);
     Templates::load(Some(&folder)).map(drop).map_err(message)
-}
-
-fn templates() -> Vec<Vec<u8>> {
-    let loop_ = "{% for plan in plans %}{{ loop.index }}. {{ plan }}\n{% endfor %}";
-    let branch = "{% if partner %}{{ partner.name | upper }}{% else %}-{% endif %}";
-    [loop_, branch, "{{ plans | length }} {{ 1 + 2 * 3 }} {{ 'a' ~ 'b' }}"]
-        .map(|text| text.as_bytes().to_vec())
-        .into()
 }
 
 /// Parses the body of a response, and the answer in it.
@@ -274,12 +273,13 @@ fn exec_response(_: &Inputs, bytes: &[u8]) -> Result<(), String> {
 }
 
 fn responses() -> Vec<Vec<u8>> {
-    let sensors = json!({"image_size": 8, "rgb": true, "depth": true, "ids": false});
+    let sensors =
+        SensorRequest { image_size: 8, rgb: true, depth: true, ids: false, frame_history: None };
     let messages = [
-        json!({"hello": {"protocol": 1, "name": "fuzz"}}),
-        json!({"ready": {"sensors": sensors}}),
-        json!({"act": {"action": {"wait": {"frames": 3}}, "thought": null}}),
-        json!({"failed": {"problem": "none"}}),
+        ResponseMessage::Hello { protocol: PROTOCOL, name: "fuzz".to_owned() },
+        ResponseMessage::Ready { sensors },
+        ResponseMessage::Act { action: Action::Wait { frames: 3 }, thought: None },
+        ResponseMessage::Failed { problem: "none".to_owned() },
     ];
     messages.iter().map(|message| inputs::to_bytes(&[inputs::head(message)])).collect()
 }

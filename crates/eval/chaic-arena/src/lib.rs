@@ -2,7 +2,7 @@
 //!
 //! An organizer holds a [`Secret`] and publishes a [`Commitment`] to it. A [`SealedSplit`] derives the
 //! seeds of its episodes and partners from the secret, so they are unknown until the secret is. Once it is
-//! published, everybody can check that it is the committed one, and play the same episodes.
+//! published, the public can check that it is the committed one, and play the same episodes.
 //!
 //! **What it is not**: it plays no episodes, and it does not keep the secret safe; that is up to the
 //! organizer.

@@ -61,7 +61,7 @@ pub fn run(
     }
 }
 
-/// What all runs of one command share.
+/// State that all runs of one command share.
 pub(super) struct Session<'a> {
     launcher: &'a Launcher,
     stop: &'static AtomicBool,

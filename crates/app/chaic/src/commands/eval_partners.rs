@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Result, bail};
+use chaic_env::helper_registry::NONE;
 use chaic_env::partner_suite::{MAX_FILE_BYTES, PartnerSuite, SUITE, SuitePartner};
 use chaic_eval::EvalError;
 use chaic_eval::run::{FolderMode, Run, RunFolder, RunRequest};
@@ -86,6 +87,11 @@ fn start_runs(
     suite: PartnerSuite,
 ) -> Result<SuiteFolder> {
     let (request, _) = request(arguments);
+    if request.helpers.as_ref().is_some_and(|names| !names.iter().any(|name| name == NONE)) {
+        let text =
+            "--partners measures gains over no helper; add none, for example --helper none,rhp";
+        return Err(EvalError::Options(text.to_owned()).into());
+    }
     for entry in suite.with_ordinary() {
         let run = path.join(&entry.name);
         let part = partner_arguments(arguments, &run, &entry)?;

@@ -1,6 +1,6 @@
 //! `chaic list`.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use chaic_agents::HelperInfo;
@@ -13,6 +13,7 @@ use chaic_env::partner_suite::{PartnerSuite, SuitePartner};
 use chaic_env::rules::{RuleSet, differing_rules, rule_names, rule_values};
 use chaic_eval::report::title;
 use chaic_eval::run::{RunFolder, planned, read_results};
+use chaic_eval::suite::SuiteFolder;
 use chaic_files::entries;
 use chaic_learn::bundled::BundledHelper;
 use chaic_llm::language::partner_names;
@@ -168,7 +169,12 @@ fn rules(format: OutputFormat) -> Result<()> {
 
 fn runs(folder: &Path, format: OutputFormat) -> Result<()> {
     let found = if folder.exists() { entries(folder)? } else { Vec::new() };
-    let mut paths: Vec<_> = found.into_iter().filter(|path| RunFolder::is_run(path)).collect();
+    let mut paths: Vec<PathBuf> = Vec::new();
+    for path in found {
+        // A folder with several partners holds a run per partner.
+        let inside = if SuiteFolder::is_suite(&path) { entries(&path)? } else { vec![path] };
+        paths.extend(inside.into_iter().filter(|path| RunFolder::is_run(path)));
+    }
     paths.sort();
     let mut rows: Vec<Value> = Vec::new();
     let mut table = table(["Run", "Finished", "Split", "Tasks", "Helpers"]);

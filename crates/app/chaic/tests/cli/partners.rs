@@ -59,6 +59,8 @@ fn runs_with_several_partners_resume_verify_and_report() {
     let verified = run_ok(at, &["verify", "s"]);
     assert!(verified.contains("the runs differ in the partner only"), "{verified}");
     run_ok(at, &["verify", "s/drawn"]);
+    let runs = run_ok(at, &["list", "runs", ".", "--format", "json"]);
+    assert_eq!(runs.matches("\"run\"").count(), 3, "{runs}");
     let report: serde_json::Value =
         serde_json::from_str(&run_ok(at, &["report", "s", "--format", "json"])).expect("JSON");
     assert_eq!(report["helpers"][0]["partners"].as_array().map(Vec::len), Some(2));
@@ -143,5 +145,7 @@ fn wrong_partners_are_refused_with_one_line() {
     }
     assert!(play(&["--partners", "missing.json"]).contains("no such file; give `suite`"));
     assert!(play(&["--partners", "suite", "--partner", "slow"]).contains("--partner"));
+    let alone = ["eval", "--episodes", "short", "--helper", "rhp", "--partners", "list.json"];
+    assert!(run_err(at, &[&alone[..], &["--out", "s"]].concat()).contains("add none"));
     assert!(play(&["--partner", "habits:order=last"]).contains("nearest, farthest, random"));
 }

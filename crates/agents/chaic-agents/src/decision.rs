@@ -250,6 +250,12 @@ pub trait Policy: Send + 'static {
         0
     }
 
+    /// Number of frames after which the agent forgets a small object that it has not seen; `None` if
+    /// it never forgets.
+    fn memory_frames(&self) -> Option<Frame> {
+        None
+    }
+
     /// Short label of the policy's state for traces, if it has one.
     fn status(&self) -> Option<String> {
         None

@@ -7,7 +7,10 @@ use chaic_core::task::SceneKind;
 
 pub use crate::child::Child;
 use crate::planning_agent::PlanningAgent;
-pub use crate::policies::{PARTNER_VARIANTS, PartnerVariant};
+pub use crate::policies::{
+    FetchOrder, HabitsError, PARTNER_VARIANTS, PartnerHabits, PartnerVariant, partner_habits,
+    recorded_partner_name,
+};
 use crate::policies::{PartnerVariantPolicy, RulePolicy, RuleProfile};
 use crate::rules::PlannerRules;
 
@@ -31,8 +34,8 @@ pub fn partner(persona: Persona, scene: SceneKind, rules: PlannerRules) -> Box<d
 }
 
 /// Constructs the agent of a partner that deviates from the rules.
-pub fn partner_variant(variant: &PartnerVariant, rules: PlannerRules) -> Box<dyn Agent> {
-    Box::new(PlanningAgent::new(PartnerVariantPolicy::new(variant.deviation), rules))
+pub fn partner_variant(habits: PartnerHabits, rules: PlannerRules) -> Box<dyn Agent> {
+    Box::new(PlanningAgent::new(PartnerVariantPolicy::new(habits), rules))
 }
 
 /// Returns the grants of a task's partner under these rules.

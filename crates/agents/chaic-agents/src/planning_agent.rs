@@ -320,6 +320,11 @@ impl<P: Policy> PlanningAgent<P> {
     pub fn observe(&mut self, observation: &Observation) {
         let Some(episode) = &mut self.episode else { return };
         episode.update(observation, self.perception.as_mut());
+        if let Some(span) = self.policy.memory_frames() {
+            // It remembers the object to which it is going.
+            let kept = episode.plan.and_then(|plan| plan.subject()).map(|subject| subject.track);
+            episode.memory.objects.forget_unseen(span, kept, episode.memory.frame);
+        }
         self.behavior.observe(observation, &episode.memory);
         self.policy.observe(observation, &episode.memory, self.behavior.log());
     }

@@ -3,6 +3,7 @@
 mod external;
 mod follow;
 mod infer;
+mod partner_habits;
 mod partner_variant;
 mod random;
 mod rule_policy;
@@ -10,7 +11,10 @@ mod rule_policy;
 pub use external::ExternalPolicy;
 pub use follow::FollowPolicy;
 pub use infer::{InferOptions, InferPolicy};
-pub use partner_variant::{Deviation, PARTNER_VARIANTS, PartnerVariant, PartnerVariantPolicy};
+pub use partner_habits::{FetchOrder, HabitsError, PartnerHabits};
+pub use partner_variant::{
+    PARTNER_VARIANTS, PartnerVariant, PartnerVariantPolicy, partner_habits, recorded_partner_name,
+};
 pub use random::RandomPolicy;
 pub use rule_policy::RulePolicy;
 

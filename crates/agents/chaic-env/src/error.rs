@@ -94,6 +94,20 @@ pub enum EnvError {
         /// Known names.
         known: Vec<String>,
     },
+    /// The parameters in the name of a partner are wrong.
+    #[error("unknown partner {problem}; docs/people.md lists the parameters")]
+    InvalidPartner {
+        /// The name, and the problem with its parameters.
+        problem: String,
+    },
+    /// A list of partners is wrong.
+    #[error("{source_name}: not a list of partners: {problem}")]
+    Partners {
+        /// File or other source of the list.
+        source_name: String,
+        /// The problem, in one line.
+        problem: String,
+    },
     /// A helper registry of another crate fails.
     #[error("{0}")]
     Registry(Box<dyn std::error::Error + Send + Sync>),
@@ -141,10 +155,17 @@ pub enum EnvError {
 impl EnvError {
     /// Returns whether the caller's arguments caused the error.
     pub fn is_usage(&self) -> bool {
-        use EnvError::{Rule, UnknownHelper, UnknownPartner, UnknownRule};
+        use EnvError::{
+            InvalidPartner, Partners, Rule, UnknownHelper, UnknownPartner, UnknownRule,
+        };
         matches!(
             self,
-            UnknownHelper { .. } | UnknownPartner { .. } | UnknownRule { .. } | Rule { .. }
+            UnknownHelper { .. }
+                | UnknownPartner { .. }
+                | InvalidPartner { .. }
+                | Partners { .. }
+                | UnknownRule { .. }
+                | Rule { .. }
         )
     }
 }

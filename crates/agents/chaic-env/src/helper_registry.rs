@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use chaic_agents::partners::{self, PARTNER_VARIANTS, PartnerVariant};
+use chaic_agents::partners::{self, HabitsError, PARTNER_VARIANTS};
 use chaic_agents::perception_factory::{GroundTruthPerceptionFactory, PerceptionFactory};
 use chaic_agents::{HELPERS, HelperInfo, PlannerRules};
 use chaic_core::Agent;
@@ -115,11 +115,12 @@ pub fn built_in_partner_names() -> Vec<String> {
     PARTNER_VARIANTS.iter().map(|variant| variant.name.to_owned()).collect()
 }
 
-/// Creates a partner of `chaic-agents` that deviates from the rules; `None` for an unknown name.
+/// Creates a partner of `chaic-agents` that deviates from the rules: one of the
+/// [names](built_in_partner_names), `habits:...` or `drawn:SEED`; `None` for any other name.
 pub fn built_in_partner(name: &str, rules: PlannerRules) -> Option<Helper> {
-    let variant = PartnerVariant::find(name)?;
+    let habits = partners::partner_habits(name).ok()?;
     let grants = partners::partner_grants(rules);
-    Some(Helper { agent: partners::partner_variant(variant, rules), grants })
+    Some(Helper { agent: partners::partner_variant(habits, rules), grants })
 }
 
 /// Registry of the helpers of `chaic-agents` with the given perception.
@@ -190,7 +191,8 @@ pub fn find_for(
 /// Creates the partner of this name; `None` for the rule-based partner of the task.
 ///
 /// # Errors
-/// [`EnvError::UnknownPartner`] with the known names.
+/// [`EnvError::UnknownPartner`] with the known names, or [`EnvError::InvalidPartner`] if the
+/// parameters in a name are wrong.
 pub fn find_partner(
     helpers: &dyn HelperRegistry,
     name: Option<&str>,
@@ -199,7 +201,10 @@ pub fn find_partner(
 ) -> Result<Option<Helper>> {
     let Some(name) = name else { return Ok(None) };
     let known = || std::iter::once(RULES.to_owned()).chain(helpers.partner_names()).collect();
-    let unknown = || EnvError::UnknownPartner { name: name.to_owned(), known: known() };
+    let unknown = || match partners::partner_habits(name) {
+        Err(HabitsError::Invalid(problem)) => EnvError::InvalidPartner { problem },
+        _ => EnvError::UnknownPartner { name: name.to_owned(), known: known() },
+    };
     helpers.partner(name, key, rules).map(Some).ok_or_else(unknown)
 }
 
@@ -217,3 +222,6 @@ fn create_unless_none(
     };
     make().map(Some).ok_or_else(unknown)
 }
+
+#[cfg(test)]
+mod tests;

@@ -55,6 +55,7 @@ pub mod helper_registry;
 mod key;
 pub mod narration;
 mod observer;
+pub mod partner_suite;
 mod playback;
 mod reseeded;
 mod reward;

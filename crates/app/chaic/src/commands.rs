@@ -30,6 +30,7 @@ pub mod view;
 
 mod bars;
 mod datasets;
+mod eval_partners;
 mod recorded;
 mod run_perception;
 mod sealed;

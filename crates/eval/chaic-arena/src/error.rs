@@ -34,6 +34,14 @@ pub enum ArenaError {
         /// Digest of the secret.
         found: String,
     },
+    /// The secret is right, but the partners are not.
+    #[error(
+        "the partners differ from those of the commitment, which chaic {sealed_by} made; use that version"
+    )]
+    OtherPartners {
+        /// Version of chaic in the commitment.
+        sealed_by: String,
+    },
     /// The secret or the run is right, but the episodes are not.
     #[error(
         "the episodes differ from those of the commitment, which chaic {sealed_by} made; use that version \

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use chaic_core::TaskId;
+use chaic_env::partner_suite::{MAX_PARTNERS, PartnerSuite, SuitePartner};
 use chaic_episodes::{
     Episode, GenerateError, GeneratorSeeds, SeedRange, Settings, generate_episode,
 };
@@ -40,6 +41,19 @@ pub struct Commitment {
     secret_sha256: String,
     /// SHA-256 of all episodes, each as one line of JSON, in the order of tasks and numbers.
     episodes_sha256: String,
+    /// Partners; absent without any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    partners: Option<CommittedPartners>,
+}
+
+/// Public description of the partners of a sealed split.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CommittedPartners {
+    /// Number of partners.
+    n: usize,
+    /// SHA-256 of `partners.json`.
+    sha256: String,
 }
 
 impl Commitment {
@@ -63,6 +77,9 @@ impl Commitment {
                 "`tasks` must differ, and `n_episodes` must be from 1 to {MAX_PER_TASK}"
             ));
         }
+        if commitment.partners.as_ref().is_some_and(|p| !(1..=MAX_PARTNERS).contains(&p.n)) {
+            return problem(format!("`partners.n` must be from 1 to {MAX_PARTNERS}"));
+        }
         Ok(commitment)
     }
 
@@ -76,7 +93,9 @@ impl Commitment {
     /// # Errors
     /// [`ArenaError::OtherSecret`] if the secret is another one.
     pub fn split(&self, secret: Secret) -> Result<SealedSplit, ArenaError> {
-        let split = SealedSplit { secret, tasks: self.tasks.clone(), n_episodes: self.n_episodes };
+        let (tasks, n_episodes) = (self.tasks.clone(), self.n_episodes);
+        let n_partners = self.partners.as_ref().map_or(0, |partners| partners.n);
+        let split = SealedSplit { secret, tasks, n_episodes, n_partners };
         let (expected, found) = (self.secret_sha256.clone(), split.secret_sha256());
         if expected == found { Ok(split) } else { Err(ArenaError::OtherSecret { expected, found }) }
     }
@@ -96,11 +115,14 @@ impl Commitment {
         Err(ArenaError::OtherEpisodes { sealed_by: self.chaic.clone() })
     }
 
-    /// Checks that this is the commitment to the same episodes.
+    /// Checks that this is the commitment to the same partners and episodes.
     ///
     /// # Errors
-    /// [`ArenaError::OtherEpisodes`] if it is not.
-    pub fn check_episodes(&self, opened: &Commitment) -> Result<(), ArenaError> {
+    /// [`ArenaError::OtherPartners`] or [`ArenaError::OtherEpisodes`] if it is not.
+    pub fn check_content(&self, opened: &Commitment) -> Result<(), ArenaError> {
+        if self.partners != opened.partners {
+            return Err(ArenaError::OtherPartners { sealed_by: self.chaic.clone() });
+        }
         if self.episodes_sha256 == opened.episodes_sha256 {
             return Ok(());
         }
@@ -118,21 +140,30 @@ pub(crate) fn episodes_sha256<'a>(episodes: impl IntoIterator<Item = &'a Episode
     to_hex(&digest.finalize())
 }
 
-/// Episodes of the standard split's kind, with seeds from a secret.
+/// Episodes of the standard split's kind, with seeds from a secret, and partners drawn from it.
 #[derive(Clone, Debug)]
 pub struct SealedSplit {
     secret: Secret,
     tasks: Vec<TaskId>,
     n_episodes: usize,
+    n_partners: usize,
 }
 
 impl SealedSplit {
-    /// Creates a split with `n_episodes` episodes (1 to 10,000) of each task. A task counts once.
+    /// Creates a split with `n_episodes` episodes (1 to 10,000) of each task and no partners. A task
+    /// counts once.
     pub fn new(secret: Secret, tasks: &[TaskId], n_episodes: usize) -> SealedSplit {
         assert!((1..=MAX_PER_TASK).contains(&n_episodes), "{n_episodes} episodes");
         let is_first = |k: &usize| !tasks[..*k].contains(&tasks[*k]);
         let tasks = (0..tasks.len()).filter(is_first).map(|k| tasks[k]).collect();
-        SealedSplit { secret, tasks, n_episodes }
+        SealedSplit { secret, tasks, n_episodes, n_partners: 0 }
+    }
+
+    /// Adds this number of drawn partners, up to [`MAX_PARTNERS`].
+    #[must_use]
+    pub fn with_partners(self, n_partners: usize) -> SealedSplit {
+        assert!(n_partners <= MAX_PARTNERS, "{n_partners} partners");
+        SealedSplit { n_partners, ..self }
     }
 
     /// Returns the number of episodes of all tasks.
@@ -149,14 +180,33 @@ impl SealedSplit {
         to_hex(&Sha256::new().chain_update(DOMAIN).chain_update(self.secret.key()).finalize())
     }
 
-    /// Returns the seed of an episode: HKDF (RFC 5869) with SHA-256.
-    fn seed(&self, task: TaskId, k: usize) -> u64 {
+    /// Returns eight bytes that follow from the secret: HKDF (RFC 5869) with SHA-256.
+    fn derive(&self, info: &str) -> u64 {
         let derivation = Hkdf::<Sha256>::new(Some(DOMAIN), self.secret.key());
         let mut bytes = [0; 8];
-        let info = format!("{task}/{k}");
         derivation.expand(info.as_bytes(), &mut bytes).expect("8 bytes are few enough");
+        u64::from_le_bytes(bytes)
+    }
+
+    /// Returns the seed of an episode.
+    fn seed(&self, task: TaskId, k: usize) -> u64 {
         // The range has a power of two as size.
-        SeedRange::SEALED.first + u64::from_le_bytes(bytes) % SeedRange::SEALED.count
+        SeedRange::SEALED.first + self.derive(&format!("{task}/{k}")) % SeedRange::SEALED.count
+    }
+
+    /// Returns the drawn partners; `None` if the split has none.
+    pub fn partners(&self) -> Option<PartnerSuite> {
+        let partner = |k: usize| {
+            SuitePartner::drawn(format!("sealed-{k:03}"), self.derive(&format!("partner/{k}")))
+        };
+        let partners: Vec<SuitePartner> = (0..self.n_partners).map(partner).collect();
+        (!partners.is_empty()).then(|| PartnerSuite::new(partners).expect("drawn ones are valid"))
+    }
+
+    fn committed_partners(&self) -> Option<CommittedPartners> {
+        let suite = self.partners()?;
+        let sha256 = to_hex(&Sha256::digest(suite.to_json()));
+        Some(CommittedPartners { n: self.n_partners, sha256 })
     }
 
     /// Generates the `k`-th episode of a task.
@@ -204,6 +254,7 @@ impl SealedSplit {
             n_episodes: self.n_episodes,
             secret_sha256: self.secret_sha256(),
             episodes_sha256: to_hex(&digest.finalize()),
+            partners: self.committed_partners(),
         }))
     }
 }
@@ -229,7 +280,7 @@ mod tests {
         let mut n = 0;
         let commitment = split.write(folder.path(), &AtomicBool::new(false), &mut || n += 1);
         assert_eq!(n, split.n_total());
-        assert_eq!(split.n_total(), TaskId::paper().count() * split.n_episodes);
+        assert_eq!(split.n_total(), split.tasks.len() * split.n_episodes);
         (folder, commitment.expect("episodes").expect("it was not stopped"))
     }
 
@@ -271,7 +322,7 @@ mod tests {
         read.check_played(&episodes).expect("the same episodes in another order");
         episodes.pop();
         assert!(matches!(read.check_played(&episodes), Err(ArenaError::OtherEpisodes { .. })));
-        read.check_episodes(&again).expect("the same episodes");
+        read.check_content(&again).expect("the same episodes");
         for task in TaskId::paper() {
             let name = format!("{task}-001.json");
             let bytes = [&folder, &other_folder].map(|f| std::fs::read(f.path().join(&name)));
@@ -282,7 +333,29 @@ mod tests {
         }
         assert!(matches!(read.split(split('3').secret), Err(ArenaError::OtherSecret { .. })));
         let (_, other) = write(&split('3'));
-        assert!(matches!(read.check_episodes(&other), Err(ArenaError::OtherEpisodes { .. })));
+        assert!(matches!(read.check_content(&other), Err(ArenaError::OtherEpisodes { .. })));
+    }
+
+    #[test]
+    fn partners_follow_from_the_secret_alone() {
+        let split = |digit| SealedSplit { n_episodes: 1, ..split(digit) }.with_partners(5);
+        // Computed with Python's `hmac` and `hashlib`. The derivation must not change.
+        let seeds = [0, 1].map(|k| split('0').derive(&format!("partner/{k}")));
+        assert_eq!(seeds, [18_257_468_226_817_487_265, 17_273_243_677_269_565_876]);
+        let partners = split('0').partners().expect("five partners");
+        assert_eq!(partners.partners().len(), 5);
+        assert_eq!(split('0').partners(), Some(partners.clone()));
+        assert_ne!(split('1').partners(), Some(partners));
+
+        let tasks: Vec<TaskId> = TaskId::paper().take(1).collect();
+        let (_, committed) = write(&SealedSplit { tasks: tasks.clone(), ..split('2') });
+        let read = Commitment::parse(committed.to_json().as_bytes()).expect("its own format");
+        let (_, opened) = write(&read.split(split('2').secret).expect("the committed secret"));
+        read.check_content(&opened).expect("the same partners");
+        let (_, fewer) = write(&SealedSplit { tasks, ..split('2').with_partners(4) });
+        assert!(matches!(read.check_content(&fewer), Err(ArenaError::OtherPartners { .. })));
+        let forged = committed.to_json().replace("\"n\": 5", "\"n\": 101");
+        assert!(matches!(Commitment::parse(forged.as_bytes()), Err(ArenaError::Format(_))));
     }
 
     #[test]

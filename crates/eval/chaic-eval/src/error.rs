@@ -26,6 +26,27 @@ pub enum EvalError {
         /// The folder.
         path: PathBuf,
     },
+    /// A folder holds the runs of several partners.
+    #[error(
+        "{path} holds runs with several partners; name one of them, such as {run}",
+        path = path.display(), run = path.join(chaic_env::helper_registry::RULES).display()
+    )]
+    SeveralPartners {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// Not all runs of a folder for several partners were started.
+    #[error(
+        "{path} was stopped before the run with partner {partner} was started; give its command again \
+         without --resume",
+        path = path.display()
+    )]
+    PartnerNotStarted {
+        /// The folder.
+        path: PathBuf,
+        /// First partner without a run.
+        partner: String,
+    },
     /// A run was stopped before its `run.json` was written.
     #[error(
         "the run in {path} was stopped before its run.json was written, so it can't be resumed; \

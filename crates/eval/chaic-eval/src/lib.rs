@@ -5,6 +5,7 @@
 //! [`metrics`] computes the paper's scores from the records, and [`report`] prints them. [`verify`]
 //! re-simulates traces and compares the records. [`replay`] and [`frame_export`] render episodes.
 //! [`explain`] describes a helper's belief in sentences, and [`calibration`] measures its quality.
+//! [`suite`] joins runs with several partners and measures robustness.
 //! [`losses`] splits the difference between a helper and the upper bound by cause. [`activity`] sums how
 //! agents spend their time, and [`examples`] selects episodes for a report.
 //! [`audit`] tests that hidden state does not influence agents.
@@ -42,6 +43,8 @@ pub mod frame_export;
 pub mod losses;
 pub mod replay;
 pub mod verify;
+
+pub mod suite;
 
 pub mod audit;
 

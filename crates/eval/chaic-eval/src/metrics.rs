@@ -9,6 +9,7 @@ mod cluster;
 mod differences;
 mod formulas;
 mod result;
+mod robustness;
 mod score;
 mod scores;
 mod significance;
@@ -24,6 +25,7 @@ pub use differences::{
 };
 pub use formulas::{FormulaSet, Formulas, Spread};
 pub use result::{Delivery, RunResult, RunStatus, Summary};
+pub use robustness::{Estimate, HelperRobustness, PartnerGain, PartnerResults, robustness};
 pub use score::{MAX_NAMED, Score};
 pub use scores::{PlayedEpisodes, Scores};
 pub use significance::{holm, two_sided_p};

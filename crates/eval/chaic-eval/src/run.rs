@@ -17,6 +17,7 @@ mod worker;
 
 pub use crate::episode_file::tasks_of_files;
 pub use folder::{FolderMode, RunFolder};
+pub(crate) use folder::{PARTNERS_FILE, has_partners};
 pub use granted::RunGrants;
 pub(crate) use journal::read_journal;
 pub use journal::{Journal, read_results};
@@ -94,6 +95,14 @@ impl Run {
             |r: &RunResult| !options.traces || r.summary().is_none() || folder.has_trace(&r.key);
         let (results, untraced) = results.into_iter().partition(is_traced);
         Ok((Run { folder, options, granted, journal, planned, results, untraced }, warnings))
+    }
+
+    /// Checks that a new run can be opened in a folder with these options, and writes nothing.
+    ///
+    /// # Errors
+    /// If the options are invalid, or name unknown agents or no episodes.
+    pub fn check(path: &Path, request: &RunRequest, helpers: &dyn HelperRegistry) -> Result<()> {
+        NewRun::prepare(path, request, helpers).map(drop)
     }
 
     /// Returns a one-line note about finished episode runs that are played again because their

@@ -6,8 +6,8 @@ mod layout;
 pub use error::EpisodeError;
 
 use chaic_core::TaskId;
-use chaic_core::capability::PersonKind;
-use chaic_world::{AgentSpec, Setup};
+use chaic_core::capability::PersonChange;
+use chaic_world::Setup;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -155,17 +155,16 @@ impl Episode {
         }
     }
 
-    /// Returns the episode with another kind of partner. The kind is appended to the name.
+    /// Returns the episode with another or a changed partner. The change is appended to the name.
     ///
     /// # Errors
     /// [`EpisodeError::Invalid`] if such a person cannot play it, for example if it does not fit at
     /// the start or has no bicycle.
-    pub fn with_partner(self, kind: PersonKind) -> Result<Episode, EpisodeError> {
+    pub fn with_partner(self, change: PersonChange) -> Result<Episode, EpisodeError> {
         let EpisodeFile { id, split, mut setup, .. } = self.file;
-        let AgentSpec { pose, appearance, .. } = setup.people[0];
-        setup.people[0] = AgentSpec::new(kind, pose, appearance);
+        setup.people[0] = setup.people[0].changed(change);
         // Generator information is dropped, because it implies the task's own partner.
-        Episode::new(format!("{id}/{kind}"), split, None, setup)
+        Episode::new(format!("{id}/{change}"), split, None, setup)
     }
 
     /// Returns the name, for example `obstacle/test/07`.

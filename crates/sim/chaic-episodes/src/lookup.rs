@@ -27,8 +27,8 @@ pub fn episodes(
 }
 
 /// Returns the episode with a name of the form `TASK/train/NN`, `TASK/test/NN`,
-/// `TASK/standard/NNN`, `TASK/gen/SEED` or `TASK/gen-standard/SEED`. A suffix `/KIND` replaces the
-/// task's partner by another kind of person.
+/// `TASK/standard/NNN`, `TASK/gen/SEED` or `TASK/gen-standard/SEED`. A suffix such as
+/// `/child` or `/+tires` is a [change](chaic_core::capability::PersonChange) of the partner.
 ///
 /// # Errors
 /// [`SplitError::NoSuchEpisode`] if no episode has this name.
@@ -37,9 +37,9 @@ pub fn find_episode(id: &str) -> Result<Episode, SplitError> {
     let parts: Vec<&str> = id.split('/').collect();
     let (task, split, number) = match parts[..] {
         [task, split, number] => (task, split, number),
-        [task, split, number, kind] => {
-            let kind = kind.parse().map_err(|_| no_such())?;
-            return Ok(find_episode(&[task, split, number].join("/"))?.with_partner(kind)?);
+        [task, split, number, change] => {
+            let change = change.parse().map_err(|_| no_such())?;
+            return Ok(find_episode(&[task, split, number].join("/"))?.with_partner(change)?);
         }
         _ => return Err(no_such()),
     };

@@ -1,7 +1,9 @@
 //! Initial condition of an episode, and the check of its values.
 
 use chaic_core::briefing::Goal;
-use chaic_core::capability::{Capability, Gait, Impairments, PersonKind, Persona, UsableHands};
+use chaic_core::capability::{
+    Capability, Gait, Impairments, PersonChange, PersonKind, Persona, UsableHands,
+};
 use chaic_core::geom::{Pose, Rect, to_xz};
 use chaic_core::{AgentId, ClassId, EntityId, Frame, TaskId, Vec2, Vec3};
 use schemars::JsonSchema;
@@ -203,6 +205,19 @@ impl AgentSpec {
     /// Returns the effective capability: the base capability with the impairments applied.
     pub fn capability(&self) -> Capability {
         self.impairments.apply(self.capability.unwrap_or_else(|| self.persona.capability()))
+    }
+
+    /// Returns the person after a change. Another persona replaces capability and impairments.
+    #[must_use]
+    pub fn changed(&self, change: PersonChange) -> AgentSpec {
+        let AgentSpec { pose, appearance, .. } = *self;
+        let base = change.persona().map(|persona| AgentSpec::new(persona, pose, appearance));
+        let mut person = base.unwrap_or(*self);
+        person.impairments =
+            change.impairments().iter().fold(person.impairments, Impairments::with);
+        let own = person.capability.unwrap_or_else(|| person.persona.capability());
+        person.capability = change.with_speed(own).or(person.capability);
+        person
     }
 
     /// Returns the persona together with the impairments.

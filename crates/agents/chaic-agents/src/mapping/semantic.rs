@@ -371,6 +371,19 @@ impl SemanticMap {
         }
     }
 
+    /// Forgets the small objects that were not seen for more than `span` frames, except `kept`. Their
+    /// next sighting counts as a change. Granted positions are not forgotten.
+    pub fn forget_unseen(&mut self, span: Frame, kept: Option<TrackId>, now: Frame) {
+        for object in self.objects.values_mut() {
+            let is_known = object.is_present && object.placement.is_none();
+            let is_small = object.class.info().is_carriable() && Some(object.track) != kept;
+            if is_known && is_small && object.last_seen + span < now {
+                object.is_present = false;
+                self.layout_version += 1;
+            }
+        }
+    }
+
     /// Ignores an object for a while, after a failed attempt.
     pub fn ignore(&mut self, track: TrackId, until: Frame) {
         if let Some(object) = self.objects.get_mut(&track) {
@@ -521,6 +534,26 @@ mod tests {
             n_forgotten += u32::from(!map.get(apple).expect("in the map").is_present);
         }
         assert_eq!(n_forgotten, 1);
+    }
+
+    #[test]
+    fn unseen_objects_are_forgotten_until_the_next_sighting() {
+        let mut toy = Toy::room(8.0, 8.0);
+        let apple = toy.add(ToyObject::new("apple", [0.0, 0.0, -2.5], [0.2, 0.2, 0.2]));
+        let bed = toy.add(ToyObject::new("bed", [2.0, 0.0, -3.0], [1.0, 0.5, 2.0]));
+        toy.stand([0.0, 0.0], 0.0);
+        let mut map = SemanticMap::default();
+        observe(&mut map, &toy, &[]);
+        let is_present = |map: &SemanticMap, track| map.get(track).expect("seen").is_present;
+        map.forget_unseen(100, None, toy.frame + 100);
+        map.forget_unseen(100, Some(apple), toy.frame + 101);
+        assert!(is_present(&map, apple), "not yet, and not the object to which the agent goes");
+        map.forget_unseen(100, None, toy.frame + 101);
+        assert!(!is_present(&map, apple) && is_present(&map, bed), "furniture stays");
+        let n_changes = map.change_count();
+        toy.frame += 200;
+        observe(&mut map, &toy, &[]);
+        assert!(is_present(&map, apple) && map.change_count() > n_changes);
     }
 
     #[test]

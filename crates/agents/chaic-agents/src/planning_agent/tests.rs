@@ -8,7 +8,7 @@ use chaic_core::task::SceneKind;
 use super::*;
 use crate::perception::{GroundTruthIds, PixelTargets};
 use crate::perception_factory::GroundTruthPerceptionFactory;
-use crate::policies::{RulePolicy, RuleProfile};
+use crate::policies::{PartnerVariantPolicy, RulePolicy, RuleProfile};
 use crate::test_support::{Toy, ToyObject};
 use crate::{helpers, partners};
 
@@ -59,6 +59,33 @@ fn the_partner_delivers_the_whole_goal_with_time_to_spare() {
     assert!(toy.frame < 2400, "{}: {history}", toy.frame);
     assert!(history.contains("container"), "{history}");
     assert!(toy.n_blocked <= 6, "bumped {} times", toy.n_blocked);
+}
+
+/// Runs a partner with these habits in the toy house until it has delivered everything; returns the
+/// frame and the plans.
+fn frames_of(habits: &str) -> (u32, Vec<String>) {
+    let (mut toy, n) = house();
+    let mut briefing = Briefing { horizon: 6000, ..toy.briefing() };
+    briefing.goal = Toy::goal(&[("apple", 3), ("banana", 2)]);
+    let habits = partners::partner_habits(habits).expect("known habits");
+    let mut agent = PlanningAgent::new(PartnerVariantPolicy::new(habits), PlannerRules::paper());
+    let plans = toy.run(&mut agent, &briefing);
+    assert!(toy.delivered.len() >= n, "{} delivered: {plans:?}", toy.delivered.len());
+    (toy.frame, plans)
+}
+
+#[test]
+fn partners_with_habits_deliver_everything_but_later() {
+    let deliveries = |plans: &[String]| plans.iter().filter(|p| p.contains("goal place")).count();
+    let (ordinary, plans) = frames_of("habits:order=nearest");
+    let trips = deliveries(&plans);
+    let (one_by_one, plans) = frames_of("habits:load=1,containers=no");
+    assert!(deliveries(&plans) >= 5 && deliveries(&plans) > trips, "{plans:?}");
+    assert!(!plans.iter().any(|p| p.contains("container")), "{plans:?}");
+    let (forgetful, _) = frames_of("habits:memory=60");
+    for frames in [one_by_one, forgetful] {
+        assert!(frames > ordinary, "{frames} frames, {ordinary} with the rules");
+    }
 }
 
 #[test]

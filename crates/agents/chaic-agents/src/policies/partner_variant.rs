@@ -4,30 +4,11 @@ use chaic_core::rng::RngStream;
 use chaic_core::task::SceneKind;
 use chaic_core::{AgentError, Briefing, Frame};
 
+use super::partner_habits::{FetchOrder, HabitsError, PartnerHabits};
 use super::rule_policy::RulePolicy;
 use crate::belief::scene_of;
-use crate::decision::{Context, Plan, Policy, Subject};
+use crate::decision::{Context, HandState, Plan, Policy, Subject};
 use crate::rules::RuleProfile;
-
-/// Pause of a slow partner before each plan, frames: about the duration of a pick-up.
-const PAUSE_FRAMES: Frame = 90;
-/// Probability that a noisy partner fetches a random possible target instead of a wanted one.
-const NOISE: f32 = 0.2;
-
-/// Deviation of a partner from the rules.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Deviation {
-    /// Fetches the farthest wanted object instead of the nearest.
-    FarthestFirst,
-    /// Fetches wanted objects in random order.
-    RandomOrder,
-    /// Fetches a random possible target instead of a wanted one with probability 0.2.
-    Noisy,
-    /// Pauses for 90 frames before each plan.
-    Slow,
-    /// Takes no containers.
-    NoContainers,
-}
 
 /// Table entry of a partner that deviates from the rules.
 #[derive(Clone, Copy, Debug)]
@@ -37,35 +18,46 @@ pub struct PartnerVariant {
     /// Description in a few words, for lists.
     pub about: &'static str,
     /// Deviation from the rules.
-    pub deviation: Deviation,
+    pub habits: PartnerHabits,
 }
 
-/// All partners that deviate from the rules. They have the grants of the rule-based partner.
-pub static PARTNER_VARIANTS: [PartnerVariant; 5] = [
+/// All partners that deviate from the rules by one habit. They have the grants of the rule-based
+/// partner.
+pub static PARTNER_VARIANTS: [PartnerVariant; 7] = [
     PartnerVariant {
         name: "farthest",
         about: "fetches the farthest wanted object first",
-        deviation: Deviation::FarthestFirst,
+        habits: PartnerHabits { order: FetchOrder::Farthest, ..PartnerHabits::RULES },
     },
     PartnerVariant {
         name: "shuffled",
         about: "fetches wanted objects in random order",
-        deviation: Deviation::RandomOrder,
+        habits: PartnerHabits { order: FetchOrder::Random, ..PartnerHabits::RULES },
     },
     PartnerVariant {
         name: "noisy",
         about: "fetches a random possible target in one of five cases",
-        deviation: Deviation::Noisy,
+        habits: PartnerHabits { noise_percent: 20, ..PartnerHabits::RULES },
     },
     PartnerVariant {
         name: "slow",
         about: "pauses for 90 frames before each plan",
-        deviation: Deviation::Slow,
+        habits: PartnerHabits::SLOW,
     },
     PartnerVariant {
         name: "no_containers",
         about: "takes no containers",
-        deviation: Deviation::NoContainers,
+        habits: PartnerHabits { takes_containers: false, ..PartnerHabits::RULES },
+    },
+    PartnerVariant {
+        name: "forgetful",
+        about: "forgets objects that it has not seen for 150 frames",
+        habits: PartnerHabits { memory_frames: Some(150), ..PartnerHabits::RULES },
+    },
+    PartnerVariant {
+        name: "one_by_one",
+        about: "delivers each object before it fetches the next",
+        habits: PartnerHabits { max_load: Some(1), ..PartnerHabits::RULES },
     },
 ];
 
@@ -76,22 +68,40 @@ impl PartnerVariant {
     }
 }
 
-/// The rules of a partner with one deviation.
+/// Returns the habits of a partner: of a table entry, `habits:...` or `drawn:SEED`.
+///
+/// # Errors
+/// [`HabitsError`] if there is no such partner, or its parameters are wrong.
+pub fn partner_habits(name: &str) -> Result<PartnerHabits, HabitsError> {
+    match PartnerVariant::find(name) {
+        Some(variant) => Ok(variant.habits),
+        None => PartnerHabits::from_name(name),
+    }
+}
+
+/// Returns the name that a run records: `drawn:SEED` and `habits:...` as all parameters that differ
+/// from the rules, and any other name unchanged. Recorded partners hence depend neither on the
+/// distribution of drawn habits nor on the order of the parameters.
+pub fn recorded_partner_name(name: &str) -> String {
+    PartnerHabits::from_name(name).map_or_else(|_| name.to_owned(), |habits| habits.to_string())
+}
+
+/// The rules of a partner with habits that deviate from them.
 #[derive(Clone, Debug)]
 pub struct PartnerVariantPolicy {
     rules: RulePolicy,
-    deviation: Deviation,
+    habits: PartnerHabits,
     rng: RngStream,
     /// Object that the partner fetches until it has it, or until it is no valid choice.
     target: Option<Subject>,
 }
 
 impl PartnerVariantPolicy {
-    /// Creates the policy of a partner with this deviation.
-    pub fn new(deviation: Deviation) -> PartnerVariantPolicy {
+    /// Creates the policy of a partner with these habits.
+    pub fn new(habits: PartnerHabits) -> PartnerVariantPolicy {
         PartnerVariantPolicy {
             rules: RulePolicy::new(RuleProfile::PARTNER),
-            deviation,
+            habits,
             rng: RngStream::new(0, "partner variant", 0),
             target: None,
         }
@@ -104,24 +114,35 @@ impl PartnerVariantPolicy {
         valid: &[Plan],
         nearest: Subject,
     ) -> Subject {
-        let choices = match self.deviation {
-            Deviation::Slow | Deviation::NoContainers => return nearest,
-            Deviation::Noisy => possible_targets(valid),
-            Deviation::FarthestFirst | Deviation::RandomOrder => {
-                self.rules.wanted_targets(context, valid)
-            }
-        };
+        let PartnerHabits { order, noise_percent, .. } = self.habits;
+        let is_noisy = noise_percent > 0;
+        if !is_noisy && order == FetchOrder::Nearest {
+            return nearest;
+        }
+        let possible = possible_targets(valid);
+        let wanted = self.rules.wanted_targets(context, valid);
+        let choices = if is_noisy { &possible } else { &wanted };
         if let Some(target) = self.target.filter(|target| choices.contains(target)) {
             return target;
         }
-        let other = match self.deviation {
-            Deviation::FarthestFirst => choices.last(),
-            Deviation::Noisy if !self.rng.chance(NOISE) => None,
-            _ => self.rng.choose(&choices),
+        let other = if is_noisy && self.rng.chance(f32::from(noise_percent) / 100.0) {
+            self.rng.choose(&possible)
+        } else {
+            match order {
+                FetchOrder::Nearest => None,
+                FetchOrder::Farthest => wanted.last(),
+                FetchOrder::Random => self.rng.choose(&wanted),
+            }
         };
         let target = other.copied().unwrap_or(nearest);
         self.target = Some(target);
         target
+    }
+
+    /// Returns whether it carries as many targets as it is used to.
+    fn is_loaded(&self, context: &Context<'_>) -> bool {
+        let Some(max) = self.habits.max_load else { return false };
+        HandState::new(&context.memory.hands, context.briefing).targets.len() >= usize::from(max)
     }
 }
 
@@ -137,16 +158,22 @@ impl Policy for PartnerVariantPolicy {
         *self = PartnerVariantPolicy {
             rules: RulePolicy::new(profile),
             rng: RngStream::new(briefing.seed, "partner variant", 0),
-            ..PartnerVariantPolicy::new(self.deviation)
+            ..PartnerVariantPolicy::new(self.habits)
         };
     }
 
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
-        let leaves_containers = self.deviation == Deviation::NoContainers;
-        let is_allowed =
-            |plan: &&Plan| !(leaves_containers && matches!(plan, Plan::PickContainer(_)));
+        let takes_containers = self.habits.takes_containers;
+        let is_loaded = self.is_loaded(context);
+        let is_allowed = |plan: &&Plan| match plan {
+            Plan::PickContainer(_) => takes_containers && !is_loaded,
+            Plan::PickUp(_) => !is_loaded,
+            _ => true,
+        };
         let allowed: Vec<Plan> = valid.iter().filter(is_allowed).copied().collect();
         Ok(match self.rules.decide(context, &allowed) {
+            // Without a known goal place, it explores to find one.
+            Plan::Explore if is_loaded && allowed.contains(&Plan::Deliver) => Plan::Deliver,
             Plan::PickUp(nearest) => Plan::PickUp(self.choose_target(context, &allowed, nearest)),
             plan => plan,
         })
@@ -157,7 +184,11 @@ impl Policy for PartnerVariantPolicy {
     }
 
     fn thinking_frames(&self) -> Frame {
-        if self.deviation == Deviation::Slow { PAUSE_FRAMES } else { 0 }
+        self.habits.pause_frames
+    }
+
+    fn memory_frames(&self) -> Option<Frame> {
+        self.habits.memory_frames
     }
 
     fn fork(&self) -> Option<PartnerVariantPolicy> {
@@ -178,7 +209,7 @@ mod tests {
     /// Lets a partner that wants three apples choose `n` times among two apples and a loaf of
     /// bread, sorted by distance, and a container if `has_container`. The partner forgets its
     /// target before each choice. Returns the tracks of the chosen objects.
-    fn choices(deviation: Deviation, n: usize, has_container: bool) -> Vec<u32> {
+    fn choices(habits: PartnerHabits, n: usize, has_container: bool) -> Vec<u32> {
         let mut briefing = Toy::room(6.0, 6.0).briefing();
         let [apple, bread, tray] = ["apple", "loaf_bread", "tea_tray"].map(ClassId::named);
         briefing.possible_targets = vec![apple, bread];
@@ -199,7 +230,7 @@ mod tests {
             Plan::PickUp(subject(21, apple)),
         ];
         valid.extend(has_container.then(|| Plan::PickContainer(subject(23, tray))));
-        let mut policy = PartnerVariantPolicy::new(deviation);
+        let mut policy = PartnerVariantPolicy::new(habits);
         policy.reset(&briefing);
         policy.rules.skip_look_around();
         let chosen = (0..n).map(|_| {
@@ -213,29 +244,48 @@ mod tests {
         tracks.iter().filter(|t| **t == track).count() as f32 / tracks.len() as f32
     }
 
+    fn habits(name: &str) -> PartnerHabits {
+        partner_habits(name).expect("a known partner")
+    }
+
     #[test]
     fn orders_of_targets_are_those_of_the_descriptions() {
-        assert_eq!(choices(Deviation::Slow, 1, false), [20]);
-        assert_eq!(choices(Deviation::FarthestFirst, 1, false), [21]);
-        let shuffled = choices(Deviation::RandomOrder, 1000, false);
+        const NOISE: f32 = 0.2;
+        assert_eq!(choices(habits("slow"), 1, false), [20]);
+        assert_eq!(choices(habits("farthest"), 1, false), [21]);
+        let shuffled = choices(habits("shuffled"), 1000, false);
         assert!((share(&shuffled, 20) - 0.5).abs() < 0.06, "{}", share(&shuffled, 20));
         assert_eq!(share(&shuffled, 22), 0.0, "bread is not wanted");
-        let noisy = choices(Deviation::Noisy, 1000, false);
+        let noisy = choices(habits("noisy"), 1000, false);
         assert!((share(&noisy, 22) - NOISE / 3.0).abs() < 0.03, "{}", share(&noisy, 22));
         assert!((share(&noisy, 20) - (1.0 - NOISE * 2.0 / 3.0)).abs() < 0.05);
+        let both = choices(habits("habits:order=farthest,noise=20"), 1000, false);
+        assert!((share(&both, 22) - NOISE / 3.0).abs() < 0.03, "{}", share(&both, 22));
+        assert!((share(&both, 21) - (1.0 - NOISE * 2.0 / 3.0)).abs() < 0.05);
     }
 
     #[test]
     fn only_one_variant_leaves_containers() {
         for variant in &PARTNER_VARIANTS {
-            let expected = if variant.deviation == Deviation::NoContainers { 20 } else { 23 };
-            assert_eq!(choices(variant.deviation, 1, true), [expected], "{}", variant.name);
+            let expected = if variant.name == "no_containers" { 20 } else { 23 };
+            assert_eq!(choices(variant.habits, 1, true), [expected], "{}", variant.name);
         }
     }
 
     #[test]
     fn slow_partners_pause_before_each_plan() {
-        assert_eq!(PartnerVariantPolicy::new(Deviation::Slow).thinking_frames(), PAUSE_FRAMES);
-        assert_eq!(PartnerVariantPolicy::new(Deviation::Noisy).thinking_frames(), 0);
+        assert_eq!(PartnerVariantPolicy::new(habits("slow")).thinking_frames(), 90);
+        assert_eq!(PartnerVariantPolicy::new(habits("noisy")).thinking_frames(), 0);
+    }
+
+    #[test]
+    fn a_recorded_name_lists_the_parameters() {
+        assert_eq!(recorded_partner_name("habits:load=1,pause=30"), "habits:pause=30,load=1");
+        let drawn = recorded_partner_name("drawn:7");
+        assert!(drawn.starts_with("habits:"), "{drawn}");
+        assert_eq!(partner_habits(&drawn), Ok(PartnerHabits::draw(7)));
+        for other in ["noisy", "llm", "habits:pause=x"] {
+            assert_eq!(recorded_partner_name(other), other);
+        }
     }
 }

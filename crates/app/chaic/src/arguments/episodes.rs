@@ -72,6 +72,9 @@ pub enum EpisodesCommand {
         /// Episodes of each task, 1 to 10000.
         #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u16).range(1..=10_000))]
         n_episodes: u16,
+        /// Partners to draw from the secret, 0 to 100; they are written to partners.json, for --partners.
+        #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=100))]
+        n_partners: u8,
         /// Folder for commitment.json, which you publish, and the folder `episodes`, which you do not.
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
@@ -87,6 +90,9 @@ pub enum EpisodesCommand {
         /// Folder for the episode files.
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
+        /// File for the partners of the split, if it has any.
+        #[arg(long, value_name = "FILE")]
+        partners: Option<PathBuf>,
     },
     /// Print the JSON schema of an episode file.
     Schema,

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use chaic_core::capability::PersonKind;
+use chaic_core::capability::PersonChange;
 use chaic_env::rules::RuleSetName;
 use chaic_env::{Appearance, Track};
 use chaic_episodes::Split;
@@ -39,7 +39,7 @@ pub enum ModelEvaluation {
 }
 
 /// Options of a benchmark run.
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 pub struct EvalArguments {
     /// Tasks, separated by commas, or `all`; `chaic list tasks` prints them [default: all].
     #[arg(long, alias = "tasks", value_name = "NAMES", value_parser = tasks)]
@@ -48,7 +48,7 @@ pub struct EvalArguments {
     /// [NAME=]exec:COMMAND, or a policy of `chaic train`, [NAME=]policy:FILE
     /// [default: none,random,rhp,oracle].
     #[arg(long, alias = "helpers", value_name = "NAMES", value_parser = helpers)]
-    helper: Option<Vec<HelperList>>,
+    pub helper: Option<Vec<HelperList>>,
     /// Episodes: test, train, standard, gen:A..B or gen-standard:A..B [default: test].
     #[arg(long)]
     pub split: Option<Split>,
@@ -75,11 +75,16 @@ pub struct EvalArguments {
     /// Episodes in parallel, 1 to 1024; does not change results [default: one per core].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(ranges::JOBS))]
     pub jobs: Option<u16>,
-    /// Agent that controls the partner; `chaic list partners` prints the names [default: rules].
+    /// Agent that controls the partner; `chaic list partners` prints the names. Also drawn:SEED or habits:...;
+    /// docs/people.md [default: rules].
     #[arg(long, value_name = "NAME")]
     pub partner: Option<String>,
     #[arg(long, alias = "partner-is", value_name = "KIND", help = person_help())]
-    pub person: Option<PersonKind>,
+    pub person: Option<PersonChange>,
+    /// Play with the ordinary partner and with each partner of a list: `suite` or a file; writes a run per
+    /// partner and a report of robustness; docs/people.md.
+    #[arg(long, value_name = "LIST", conflicts_with_all = ["partner", "person"])]
+    pub partners: Option<String>,
     /// Light and colors: canonical, evening, or varied:SEED for domain randomization. Depth and ids stay
     /// the same [default: canonical].
     #[arg(long, value_name = "APPEARANCE")]
@@ -117,7 +122,7 @@ pub struct EvalArguments {
 }
 
 fn person_help() -> String {
-    format!("Kind of person that replaces the partner of each episode: {}", PersonKind::choices())
+    format!("Kind of person that the partner of each episode is: {}", PersonChange::choices())
 }
 
 impl EvalArguments {
@@ -167,7 +172,7 @@ impl EvalArguments {
 }
 
 /// Endpoint of the language model.
-#[derive(Args, Debug, Default)]
+#[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Language helpers")]
 pub struct LanguageArguments {
     /// Address of the language model, for example http://127.0.0.1:8000/v1. The key is read from the

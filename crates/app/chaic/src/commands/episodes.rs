@@ -31,11 +31,15 @@ pub fn run(command: &EpisodesCommand, format: OutputFormat) -> Result<ExitStatus
         }
         EpisodesCommand::Validate { split: Some(split), .. } => validate_split(split, format),
         EpisodesCommand::Validate { files, .. } => validate(files, format),
-        EpisodesCommand::Seal { secret, task, n_episodes, out } => {
-            sealed::seal(secret, &task.0, usize::from(*n_episodes), out, format)
+        EpisodesCommand::Seal { secret, task, n_episodes, n_partners, out } => {
+            let size = sealed::SplitSize {
+                n_episodes: usize::from(*n_episodes),
+                n_partners: usize::from(*n_partners),
+            };
+            sealed::seal(secret, &task.0, size, out, format)
         }
-        EpisodesCommand::Open { secret, commitment, out } => {
-            sealed::open(secret, commitment, out, format)
+        EpisodesCommand::Open { secret, commitment, out, partners } => {
+            sealed::open(secret, commitment, out, partners.as_deref(), format)
         }
         EpisodesCommand::Schema => {
             print(&(serde_json::to_string_pretty(&json_schema())? + "\n"))?;

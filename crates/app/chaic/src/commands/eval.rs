@@ -2,12 +2,14 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use anyhow::{Context as _, Result, anyhow, bail};
 use chaic_env::helper_registry::{BuiltInWithPerception, HelperRegistry};
 use chaic_eval::report::write_files;
 use chaic_eval::run::{FolderMode, Run, RunFolder, RunRequest, Shard};
+use chaic_eval::suite::SuiteFolder;
 use chaic_learn::helpers::{NamedPolicy, PolicyRegistry};
 use chaic_llm::LanguageHelpers;
 use chaic_page::{REPORT_FILE, write_report};
@@ -15,7 +17,7 @@ use chaic_sandbox::Launcher;
 use chaic_subprocess::{CommandRegistry, HelperProgram};
 
 use super::summary::{print_scores, report_of};
-use super::{bars::RunBars, jobs, llm, run_perception, start_threads};
+use super::{bars::RunBars, eval_partners, jobs, llm, run_perception, start_threads};
 use crate::arguments::{EvalArguments, ExecArguments, HelperArgument};
 use crate::exit::ExitStatus;
 use crate::interrupt;
@@ -32,66 +34,142 @@ pub fn run(
     format: OutputFormat,
     launcher: &Launcher,
 ) -> Result<ExitStatus> {
+    let resumed = arguments.out.as_deref().filter(|_| arguments.resume);
+    if arguments.partners.is_some() || resumed.is_some_and(SuiteFolder::is_suite) {
+        return eval_partners::run(arguments, format, launcher);
+    }
     let (request, name) = request(arguments);
     let path = arguments.out.clone().map_or_else(|| free_folder(name), Ok)?;
-    let mode = if arguments.resume { FolderMode::Resume } else { FolderMode::New };
     if arguments.resume {
         RunFolder::check_started(&path)?;
     }
-    let stop = interrupt::stop_flag()?;
-    let built_in =
-        BuiltInWithPerception { perception: run_perception::perception_of_run(arguments, &path)? };
-    let language = llm::language(arguments, &path, stop)?;
-    let language =
-        language.map(|language| language.with_perception(Arc::clone(&built_in.perception)));
-    let registry: &dyn HelperRegistry = match &language {
-        Some(language) => language,
-        None => &built_in,
-    };
-    let policies: chaic_env::Result<Vec<NamedPolicy>> =
-        arguments.policies().map(|(name, file)| NamedPolicy::read(name, file)).collect();
-    let policies = PolicyRegistry::bundled(registry, Arc::clone(&built_in.perception))
-        .with_policies(policies?)?;
-    let commands = CommandRegistry::new(&policies, confined(arguments, &path, launcher)?, stop)?;
-    if arguments.resume {
-        commands.check_resumed(&path)?;
-    }
-    let helpers: &dyn HelperRegistry = &commands;
-    let (mut run, warnings) = Run::open(&path, mode, &request, helpers)?;
-    warn_of_run(&run, &warnings);
-    hide_worker_panics();
-    print_start(&run, &path);
-    let jobs = jobs(arguments.jobs);
-    start_threads(jobs)?;
+    let session = Session::new(arguments, launcher)?;
     let start = Instant::now();
-    let mut bars = RunBars::new(run.progress());
-    if let Some(language) = &language {
-        language.listen(Box::new(bars.line_printer()));
+    match session.play(arguments, &path, &request, None)? {
+        Played::Whole(run) => finish(&run, format, start),
+        Played::Part(run) => {
+            print_error(&format!(
+                "shard {} is played: {} of {}; join the shards with: chaic merge --out WHOLE {} ...",
+                session.shard,
+                run.progress().finished,
+                counted(run.progress().total, "episode run"),
+                quoted_path(&path),
+            ));
+            Ok(ExitStatus::from_findings(run.progress().errors > 0))
+        }
+        Played::Stopped => Ok(ExitStatus::Interrupted),
     }
-    let shard = arguments.shard.unwrap_or(Shard::WHOLE);
-    let played = run.play_shard(shard, jobs, helpers, stop, &mut |event| bars.show(event));
-    bars.clear();
-    let is_complete = played.map_err(|e| anyhow!("{e:#}\n{}", how_to_resume(&path, arguments)))?;
-    if let Some(problem) = language.as_ref().and_then(LanguageHelpers::problem) {
-        bail!("paused: {problem}\n{}", how_to_resume(&path, arguments));
+}
+
+/// State that all runs of one command share.
+pub(super) struct Session<'a> {
+    launcher: &'a Launcher,
+    stop: &'static AtomicBool,
+    jobs: usize,
+    pub shard: Shard,
+}
+
+/// A run after it was played.
+pub(super) enum Played {
+    /// All episode runs are finished.
+    Whole(Box<Run>),
+    /// The episode runs of the shard are finished.
+    Part(Box<Run>),
+    /// The user stopped it; a message is printed.
+    Stopped,
+}
+
+impl<'a> Session<'a> {
+    /// Starts the threads. A process has one session.
+    ///
+    /// # Errors
+    /// If the system refuses the threads.
+    pub fn new(arguments: &EvalArguments, launcher: &'a Launcher) -> Result<Session<'a>> {
+        let stop = interrupt::stop_flag()?;
+        let jobs = jobs(arguments.jobs);
+        start_threads(jobs)?;
+        hide_worker_panics();
+        Ok(Session { launcher, stop, jobs, shard: arguments.shard.unwrap_or(Shard::WHOLE) })
     }
-    let extent = run.progress();
-    if !is_complete {
-        let done = extent.finished - extent.errors;
-        print_error(&format!("stopped after {done} of {}", counted(extent.total, "episode run")));
-        print_error(&how_to_resume(&path, arguments));
-        return Ok(ExitStatus::Interrupted);
+
+    /// Plays the run in a folder. `part` names it among the runs of the command.
+    ///
+    /// # Errors
+    /// If the options are invalid, or a file can't be read or written.
+    pub fn play(
+        &self,
+        arguments: &EvalArguments,
+        path: &Path,
+        request: &RunRequest,
+        part: Option<&str>,
+    ) -> Result<Played> {
+        self.with_helpers(arguments, path, |helpers, language| {
+            let mode = if arguments.resume { FolderMode::Resume } else { FolderMode::New };
+            let (mut run, warnings) = Run::open(path, mode, request, helpers)?;
+            warn_of_run(&run, &warnings);
+            print_start(&run, path);
+            let mut bars = match part {
+                Some(part) => RunBars::for_part(run.progress(), part),
+                None => RunBars::new(run.progress()),
+            };
+            if let Some(language) = language {
+                language.listen(Box::new(bars.line_printer()));
+            }
+            let played = run.play_shard(self.shard, self.jobs, helpers, self.stop, &mut |event| {
+                bars.show(event)
+            });
+            bars.clear();
+            let folder = part.and(path.parent()).unwrap_or(path);
+            let resume = how_to_resume(folder, arguments);
+            let is_complete = played.map_err(|e| anyhow!("{e:#}\n{resume}"))?;
+            if let Some(problem) = language.and_then(LanguageHelpers::problem) {
+                bail!("paused: {problem}\n{resume}");
+            }
+            let extent = run.progress();
+            if !is_complete {
+                let done = extent.finished - extent.errors;
+                print_error(&format!(
+                    "stopped after {done} of {}",
+                    counted(extent.total, "episode run")
+                ));
+                print_error(&resume);
+                return Ok(Played::Stopped);
+            }
+            let run = Box::new(run);
+            Ok(if extent.finished < extent.total { Played::Part(run) } else { Played::Whole(run) })
+        })
     }
-    if extent.finished < extent.total {
-        print_error(&format!(
-            "shard {shard} is played: {} of {}; join the shards with: chaic merge --out WHOLE {} ...",
-            extent.finished,
-            counted(extent.total, "episode run"),
-            quoted_path(&path),
-        ));
-        return Ok(ExitStatus::from_findings(extent.errors > 0));
+
+    /// Calls a function with the helpers of the run in a folder.
+    ///
+    /// # Errors
+    /// If a helper is unknown or can't be made, and those of the function.
+    pub fn with_helpers<T>(
+        &self,
+        arguments: &EvalArguments,
+        path: &Path,
+        then: impl FnOnce(&dyn HelperRegistry, Option<&LanguageHelpers>) -> Result<T>,
+    ) -> Result<T> {
+        let perception = run_perception::perception_of_run(arguments, path)?;
+        let built_in = BuiltInWithPerception { perception };
+        let language = llm::language(arguments, path, self.stop)?;
+        let language =
+            language.map(|language| language.with_perception(Arc::clone(&built_in.perception)));
+        let registry: &dyn HelperRegistry = match &language {
+            Some(language) => language,
+            None => &built_in,
+        };
+        let policies: chaic_env::Result<Vec<NamedPolicy>> =
+            arguments.policies().map(|(name, file)| NamedPolicy::read(name, file)).collect();
+        let policies = PolicyRegistry::bundled(registry, Arc::clone(&built_in.perception))
+            .with_policies(policies?)?;
+        let processes = confined(arguments, path, self.launcher)?;
+        let commands = CommandRegistry::new(&policies, processes, self.stop)?;
+        if arguments.resume {
+            commands.check_resumed(path)?;
+        }
+        then(&commands, language.as_ref())
     }
-    finish(&run, format, start)
 }
 
 /// Prints the extent of a run before it is played.
@@ -137,9 +215,8 @@ fn confined(
 
 /// Writes the report of a complete run and prints the short report.
 fn finish(run: &Run, format: OutputFormat, start: Instant) -> Result<ExitStatus> {
+    write_reports(run)?;
     let report = report_of(run);
-    write_files(run.folder(), &report)?;
-    write_report(run.folder(), &report)?;
     let path = quoted_path(run.folder().path());
     let secs = start.elapsed().as_secs();
     let mut more = vec![
@@ -160,8 +237,16 @@ fn finish(run: &Run, format: OutputFormat, start: Instant) -> Result<ExitStatus>
     Ok(ExitStatus::from_findings(run.progress().errors > 0))
 }
 
+/// Writes the files and the page of a report into the folder of a run.
+pub(super) fn write_reports(run: &Run) -> Result<()> {
+    let report = report_of(run);
+    write_files(run.folder(), &report)?;
+    write_report(run.folder(), &report)?;
+    Ok(())
+}
+
 /// Returns the requested run, and a name for its folder. Without any option it is the small benchmark.
-fn request(arguments: &EvalArguments) -> (RunRequest, &'static str) {
+pub(super) fn request(arguments: &EvalArguments) -> (RunRequest, &'static str) {
     let EvalArguments { task, split, episodes, n_episodes, rules, set, seeds, size, .. } =
         arguments;
     let request = RunRequest {
@@ -189,7 +274,7 @@ fn request(arguments: &EvalArguments) -> (RunRequest, &'static str) {
 }
 
 /// Returns the first of `runs/NAME`, `runs/NAME-2`, ... that does not exist.
-fn free_folder(name: &str) -> Result<PathBuf> {
+pub(super) fn free_folder(name: &str) -> Result<PathBuf> {
     /// Limit of the search.
     const MAX_RUNS: u32 = 10_000;
     let numbered = |k: u32| if k == 1 { name.to_owned() } else { format!("{name}-{k}") };

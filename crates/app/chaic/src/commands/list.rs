@@ -1,6 +1,6 @@
 //! `chaic list`.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use chaic_agents::HelperInfo;
@@ -9,9 +9,11 @@ use chaic_core::capability::{IMPAIRMENTS, Persona};
 use chaic_core::observation::Grants;
 use chaic_core::task::{Origin, TASKS};
 use chaic_env::helper_registry::{NONE, RULES};
+use chaic_env::partner_suite::{PartnerSuite, SuitePartner};
 use chaic_env::rules::{RuleSet, differing_rules, rule_names, rule_values};
 use chaic_eval::report::title;
 use chaic_eval::run::{RunFolder, planned, read_results};
+use chaic_eval::suite::SuiteFolder;
 use chaic_files::entries;
 use chaic_learn::bundled::BundledHelper;
 use chaic_llm::language::partner_names;
@@ -128,7 +130,7 @@ fn people(format: OutputFormat) -> Result<()> {
 
 fn partners(format: OutputFormat) -> Result<()> {
     let mut rows = Vec::new();
-    let mut table = table(["Name", "The partner ..."]);
+    let mut minds = table(["Name", "The partner ..."]);
     for name in [RULES.to_owned()].into_iter().chain(partner_names()) {
         let description = match name.as_str() {
             RULES => "follows the rules of the paper",
@@ -136,11 +138,19 @@ fn partners(format: OutputFormat) -> Result<()> {
             "vlm" => "asks a language model, with text and images",
             name => PartnerVariant::find(name).map_or("", |variant| variant.about),
         };
-        table.add_row([name.as_str(), description]);
+        minds.add_row([name.as_str(), description]);
         rows.push(json!({ "name": name, "description": description }));
     }
-    let more = "`--partner NAME` selects one; `--person` selects the body. docs/people.md.\n";
-    print_result(format, &rows, &format!("{}\n{more}", table.trim_fmt()))
+    let mut suite = table(["Partner of the suite", "--partner", "--person"]);
+    for SuitePartner { name, partner, person } in PartnerSuite::bundled().partners() {
+        let person = person.map(|change| change.to_string()).unwrap_or_default();
+        suite.add_row([name.as_str(), partner.as_deref().unwrap_or(RULES), &person]);
+    }
+    let more = "`--partner NAME` selects one; also drawn:SEED and habits:.... `--person` selects the body.\n\
+                `--partners suite` plays all of the second table. docs/people.md.\n";
+    let text = format!("{}\n{}\n{more}", minds.trim_fmt(), suite.trim_fmt());
+    let json = json!({ "partners": rows, "suite": PartnerSuite::bundled().partners() });
+    print_result(format, &json, &text)
 }
 
 fn rules(format: OutputFormat) -> Result<()> {
@@ -159,7 +169,12 @@ fn rules(format: OutputFormat) -> Result<()> {
 
 fn runs(folder: &Path, format: OutputFormat) -> Result<()> {
     let found = if folder.exists() { entries(folder)? } else { Vec::new() };
-    let mut paths: Vec<_> = found.into_iter().filter(|path| RunFolder::is_run(path)).collect();
+    let mut paths: Vec<PathBuf> = Vec::new();
+    for path in found {
+        // A folder with several partners holds a run per partner.
+        let inside = if SuiteFolder::is_suite(&path) { entries(&path)? } else { vec![path] };
+        paths.extend(inside.into_iter().filter(|path| RunFolder::is_run(path)));
+    }
     paths.sort();
     let mut rows: Vec<Value> = Vec::new();
     let mut table = table(["Run", "Finished", "Split", "Tasks", "Helpers"]);

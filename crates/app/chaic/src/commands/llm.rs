@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context as _, Result, bail};
+use chaic_agents::partners::{HabitsError, partner_habits};
 use chaic_core::AgentId;
 use chaic_env::EnvError;
 use chaic_env::helper_registry::{NONE, RULES};
@@ -139,9 +140,13 @@ fn check_names(arguments: &EvalArguments) -> Result<(), EnvError> {
         return Err(EnvError::UnknownHelper { name, known });
     }
     let known: Vec<String> = [RULES.to_owned()].into_iter().chain(partner_names()).collect();
-    match arguments.partner.clone().filter(|name| !known.contains(name)) {
-        Some(name) => Err(EnvError::UnknownPartner { name, known }),
-        None => Ok(()),
+    let Some(name) = arguments.partner.clone().filter(|name| !known.contains(name)) else {
+        return Ok(());
+    };
+    match partner_habits(&name) {
+        Ok(_) => Ok(()),
+        Err(HabitsError::Unknown) => Err(EnvError::UnknownPartner { name, known }),
+        Err(HabitsError::Invalid(problem)) => Err(EnvError::InvalidPartner { problem }),
     }
 }
 

@@ -1,9 +1,12 @@
 //! `chaic merge`.
 
 use anyhow::Result;
+use chaic_eval::EvalError;
 use chaic_eval::run::merge;
+use chaic_eval::suite::SuiteFolder;
 use chaic_page::write_report;
 
+use super::eval_partners::print_robustness;
 use super::summary::{print_scores, report_of};
 use crate::arguments::MergeArguments;
 use crate::exit::ExitStatus;
@@ -11,6 +14,9 @@ use crate::output::{OutputFormat, counted, print_warning};
 
 /// Joins the shards of a run.
 pub fn run(arguments: &MergeArguments, format: OutputFormat) -> Result<ExitStatus> {
+    if arguments.runs.iter().any(|run| SuiteFolder::is_suite(run)) {
+        return merge_partners(arguments, format);
+    }
     let run = merge(&arguments.out, &arguments.runs)?;
     let extent = run.progress();
     let missing = extent.total - extent.finished;
@@ -25,4 +31,23 @@ pub fn run(arguments: &MergeArguments, format: OutputFormat) -> Result<ExitStatu
         print_scores(format, &report, run.folder(), &[])?;
     }
     Ok(ExitStatus::from_findings(missing > 0 || extent.errors > 0))
+}
+
+/// Joins the shards of runs with several partners.
+fn merge_partners(arguments: &MergeArguments, format: OutputFormat) -> Result<ExitStatus> {
+    if let Some(run) = arguments.runs.iter().find(|run| !SuiteFolder::is_suite(run)) {
+        let text = format!("{} has no runs with several partners, as the others do", run.display());
+        return Err(EvalError::Options(text).into());
+    }
+    let (folder, merged) = SuiteFolder::merge(&arguments.out, &arguments.runs)?;
+    let mut is_good = true;
+    for run in &merged {
+        let extent = run.progress();
+        is_good &= extent.finished == extent.total && extent.errors == 0;
+        if extent.finished > 0 {
+            write_report(run.folder(), &report_of(run))?;
+        }
+    }
+    print_robustness(&folder, format, None)?;
+    Ok(ExitStatus::from_findings(!is_good))
 }

@@ -6,9 +6,10 @@ use anyhow::{Context, Result};
 use chaic_eval::EvalError;
 use chaic_eval::calibration::read_scores;
 use chaic_eval::losses::Losses;
-use chaic_eval::metrics::{RunResult, tally};
+use chaic_eval::metrics::{FormulaSet, RunResult, tally};
 use chaic_eval::report::{Format, Report, untraced_note, write_figure};
 use chaic_eval::run::{EpisodeJob, RunFolder, RunOptions, planned, read_results};
+use chaic_eval::suite::{Robustness, SuiteFolder};
 
 use crate::arguments::ReportArguments;
 use crate::exit::ExitStatus;
@@ -22,6 +23,9 @@ pub fn run(arguments: &ReportArguments, format: OutputFormat) -> Result<ExitStat
         OutputFormat::Markdown => Format::Markdown,
         OutputFormat::Csv => Format::Csv,
     };
+    if SuiteFolder::is_suite(&arguments.run) {
+        return report_robustness(arguments, format);
+    }
     let (folder, options) = RunFolder::read(&arguments.run)?;
     if (arguments.from_traces || arguments.belief) && !options.traces {
         return Err(EvalError::NoTraces { path: folder.path().to_owned() }.into());
@@ -64,6 +68,20 @@ pub fn run(arguments: &ReportArguments, format: OutputFormat) -> Result<ExitStat
         Some(path) => write_figure(&report.scores(), report.labels(), path)?,
         None => print(&report.text(format))?,
     }
+    Ok(ExitStatus::Success)
+}
+
+/// Prints the robustness of the helpers of runs with several partners.
+fn report_robustness(arguments: &ReportArguments, format: Format) -> Result<ExitStatus> {
+    let ReportArguments { run, formulas, from_traces, figure, belief, losses, baseline } =
+        arguments;
+    let is_plain = *formulas == FormulaSet::Paper && figure.is_none() && baseline.is_none();
+    if *from_traces || *belief || *losses || !is_plain {
+        return Err(EvalError::SeveralPartners { path: run.clone() }.into());
+    }
+    let (runs, warnings) = SuiteFolder::read(run)?.runs()?;
+    warnings.iter().for_each(|warning| print_warning(&warning.to_string()));
+    print(&Robustness::from_runs(&runs).text(format))?;
     Ok(ExitStatus::Success)
 }
 

@@ -5,6 +5,7 @@ use std::path::Path;
 use anyhow::{Context as _, Result};
 use chaic_arena::{Commitment, SealedSplit, Secret};
 use chaic_core::TaskId;
+use chaic_eval::EvalError;
 use chaic_files::{read_user_file, write_atomically};
 use serde_json::json;
 
@@ -20,12 +21,23 @@ const EPISODES: &str = "episodes";
 /// Maximum size of a commitment, bytes: one takes about 500.
 const MAX_COMMITMENT_BYTES: u64 = 64 << 10;
 
+/// File of the partners in the folder of a sealed split.
+const PARTNERS: &str = "partners.json";
+
+/// Size of a sealed split.
+pub(super) struct SplitSize {
+    /// Episodes of each task.
+    pub n_episodes: usize,
+    /// Drawn partners.
+    pub n_partners: usize,
+}
+
 /// Makes a sealed split. A secret that exists is used again, so that an interrupted command can be
 /// repeated.
 pub(super) fn seal(
     secret_path: &Path,
     tasks: &[TaskId],
-    n_episodes: usize,
+    size: SplitSize,
     out: &Path,
     format: OutputFormat,
 ) -> Result<ExitStatus> {
@@ -34,19 +46,28 @@ pub(super) fn seal(
     } else {
         Secret::create(secret_path)?
     };
-    let split = SealedSplit::new(secret, tasks, n_episodes);
+    let split = SealedSplit::new(secret, tasks, size.n_episodes).with_partners(size.n_partners);
     let episodes = out.join(EPISODES);
     let Some(commitment) = write_episodes(&split, &episodes)? else {
         return Ok(ExitStatus::Interrupted);
     };
+    let partners = split.partners().map(|suite| (out.join(PARTNERS), suite));
+    if let Some((path, suite)) = &partners {
+        write_atomically(path, suite.to_json().as_bytes())?;
+    }
     let path = out.join(COMMITMENT);
     write_atomically(&path, commitment.to_json().as_bytes())?;
     let json = json!({
         "split": split.name(), "episodes": split.n_total(), "secret": secret_path,
         "commitment": path, "folder": episodes,
+        "partners": partners.as_ref().map(|(path, _)| path),
+    });
+    let partners = partners.map_or_else(String::new, |(path, suite)| {
+        format!("{}: {}\n", path.display(), counted(suite.partners().len(), "partner"))
     });
     let text = format!(
-        "{}: {} of {}\n{}: publish this file\n{}: keep this file to yourself until you open the split\n",
+        "{}: {} of {}\n{partners}{}: publish this file\n{}: keep this file to yourself until you open the \
+         split\n",
         episodes.display(),
         counted(split.n_total(), "episode"),
         split.name(),
@@ -62,15 +83,24 @@ pub(super) fn open(
     secret_path: &Path,
     commitment_path: &Path,
     out: &Path,
+    partners: Option<&Path>,
     format: OutputFormat,
 ) -> Result<ExitStatus> {
     let name = commitment_path.display().to_string();
     let commitment = read_commitment(commitment_path)?;
     let split = commitment.split(Secret::read(secret_path)?).with_context(|| name.clone())?;
+    let suite = split.partners();
+    if partners.is_some() && suite.is_none() {
+        let text = format!("{name}: the split has no partners; omit --partners");
+        return Err(EvalError::Options(text).into());
+    }
     let Some(opened) = write_episodes(&split, out)? else {
         return Ok(ExitStatus::Interrupted);
     };
-    commitment.check_episodes(&opened).context(name)?;
+    commitment.check_content(&opened).context(name)?;
+    if let Some((path, suite)) = partners.zip(suite) {
+        write_atomically(path, suite.to_json().as_bytes())?;
+    }
     let json = json!({ "split": split.name(), "episodes": split.n_total(), "folder": out });
     let text = format!(
         "{}: {} of {}, the committed ones\n",

@@ -6,6 +6,7 @@ use anyhow::Result;
 use chaic_core::AgentId;
 use chaic_episodes::find_episode;
 use chaic_eval::run::RunFolder;
+use chaic_eval::suite::SuiteFolder;
 use chaic_eval::trace_file;
 use chaic_eval::verify::{Finding, Mismatch, ReportState, VerificationReport, verify, verify_run};
 use serde_json::json;
@@ -21,27 +22,71 @@ pub fn run(arguments: &VerifyArguments, format: OutputFormat) -> Result<ExitStat
     if arguments.run.is_file() {
         return verify_file(&arguments.run, format);
     }
-    let (folder, options) = RunFolder::read(&arguments.run)?;
+    if SuiteFolder::is_suite(&arguments.run) {
+        return verify_partners(arguments, format);
+    }
+    let verdict = verdict(&arguments.run, arguments)?;
+    print_result(format, &to_json(&verdict), &text(&verdict))?;
+    Ok(ExitStatus::from_findings(!verdict.is_good()))
+}
+
+/// Verifies the run in a folder, and prints its warnings.
+fn verdict(run: &Path, arguments: &VerifyArguments) -> Result<VerificationReport> {
+    let (folder, options) = RunFolder::read(run)?;
     let bar = bars::count_bar(folder.traces()?.len() as u64, "traces");
     let progress = |done: usize| bar.set_position(done as u64);
-    let helpers = RecordedHelpers::new(&arguments.run, &options)?;
+    let helpers = RecordedHelpers::new(run, &options)?;
     let verdict =
         verify_run(&folder, &options, &helpers.registry(), jobs(arguments.jobs), &progress);
     bar.finish_and_clear();
     let verdict = verdict?;
     if verdict.agreeing + verdict.mismatches.len() + verdict.findings.len() == 0 {
-        anyhow::bail!("{} has no trace to verify", arguments.run.display());
+        anyhow::bail!("{} has no trace to verify", run.display());
     }
     for warning in &verdict.warnings {
         print_warning(&warning.to_string());
     }
+    Ok(verdict)
+}
+
+/// Formats all differences and findings, and the summary.
+fn text(verdict: &VerificationReport) -> String {
     let differences: Vec<String> =
         verdict.mismatches.iter().map(|mismatch| format!("DIFFERS {mismatch}\n")).collect();
     let findings: Vec<String> =
         verdict.findings.iter().map(|finding| format!("FOUND {finding}\n")).collect();
-    let text = differences.concat() + &findings.concat() + &summary(&verdict) + "\n";
-    print_result(format, &to_json(&verdict), &text)?;
-    Ok(ExitStatus::from_findings(!verdict.is_good()))
+    differences.concat() + &findings.concat() + &summary(verdict) + "\n"
+}
+
+/// Verifies the runs of all partners, and that they differ in the partner only.
+fn verify_partners(arguments: &VerifyArguments, format: OutputFormat) -> Result<ExitStatus> {
+    let folder = SuiteFolder::read(&arguments.run)?;
+    // Each run reports its own incomplete records.
+    let (runs, _) = folder.runs()?;
+    let findings = folder.findings(&runs)?;
+    let mut is_good = findings.is_empty();
+    let mut all_text: String =
+        findings.iter().map(|finding| format!("FOUND {finding}\n")).collect();
+    let mut of_partners = serde_json::Map::new();
+    for entry in folder.partners() {
+        let verdict = verdict(&folder.run_path(&entry), arguments)?;
+        is_good &= verdict.is_good();
+        all_text += &format!("{}: {}", entry.name, text(&verdict));
+        of_partners.insert(entry.name, to_json(&verdict));
+    }
+    all_text += if findings.is_empty() {
+        "the runs differ in the partner only, and the robustness report agrees with them\n"
+    } else {
+        "the folder has findings beside those of its runs\n"
+    };
+    let finding = |f: &Finding| json!({ "path": f.path, "problem": f.problem });
+    let json = json!({
+        "passed": is_good,
+        "findings": findings.iter().map(finding).collect::<Vec<_>>(),
+        "partners": of_partners,
+    });
+    print_result(format, &json, &all_text)?;
+    Ok(ExitStatus::from_findings(!is_good))
 }
 
 /// Replays a trace that belongs to no run, such as that of a game in a browser.

@@ -14,6 +14,7 @@ mod interrupted;
 mod language;
 mod learning;
 mod lists;
+mod partners;
 mod perception;
 mod pictures;
 mod run_folders;

@@ -65,7 +65,8 @@ fn a_sealed_split_is_played_and_opened_by_its_secret_alone() {
     let dir = tempfile::tempdir().expect("the disk has space");
     let at = dir.path();
     let seal = ["episodes", "seal", "--secret", "secret", "--task", "obstacle,shopping"];
-    run_ok(at, &[&seal[..], &["--n-episodes", "1", "--out", "sealed"]].concat());
+    let size = ["--n-episodes", "1", "--n-partners", "2"];
+    run_ok(at, &[&seal[..], &size, &["--out", "sealed"]].concat());
     let play = ["eval", "--helper", "none", "--size", "32", "--out", "run"];
     run_ok(at, &[&play[..], &["--episodes", "sealed/episodes"]].concat());
     assert!(run_ok(at, &["verify", "run"]).contains("all digests agree"));
@@ -77,14 +78,21 @@ fn a_sealed_split_is_played_and_opened_by_its_secret_alone() {
     let json: serde_json::Value = serde_json::from_slice(&episode).expect("it is JSON");
     assert!(!commitment.contains(secret.trim()));
     assert!(!commitment.contains(&json["generator"]["seed"].to_string()));
+    assert!(!commitment.contains("habits"), "{commitment}");
 
     let open = ["episodes", "open", "--commitment", "sealed/commitment.json", "--out", "opened"];
-    run_ok(at, &[&open[..], &["--secret", "secret"]].concat());
+    run_ok(at, &[&open[..], &["--secret", "secret", "--partners", "partners.json"]].concat());
     assert!(fs::read(at.join("opened/obstacle-000.json")).expect("an episode") == episode);
+    let partners = ["sealed/partners.json", "partners.json"].map(|file| fs::read(at.join(file)));
+    let [sealed, opened] = partners.map(|bytes| bytes.expect("a list of partners"));
+    assert!(sealed == opened && sealed.starts_with(b"{"));
 
     fs::write(at.join("other"), "0".repeat(64)).expect("the disk has space");
     let refused = run_err(at, &[&open[..], &["--secret", "other"]].concat());
     assert!(refused.contains("the secret is not that of the commitment"), "{refused}");
+    fs::write(at.join("short"), "0".repeat(63)).expect("the disk has space");
+    let refused = run_err(at, &[&open[..], &["--secret", "short"]].concat());
+    assert!(refused.contains("64 hexadecimal digits"), "{refused}");
     let forged = commitment.replace("\"episodes_sha256\": \"", "\"episodes_sha256\": \"0");
     fs::write(at.join("sealed/commitment.json"), forged).expect("the disk has space");
     let refused = run_err(at, &[&open[..], &["--secret", "secret"]].concat());

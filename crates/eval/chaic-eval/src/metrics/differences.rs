@@ -125,7 +125,7 @@ fn difference(
 }
 
 /// Returns a helper's transport rates by episode, averaged over seeds.
-fn rates<'a>(
+pub(super) fn rates<'a>(
     by_helper: &BTreeMap<&'a str, ByEpisode<'a>>,
     helper: &str,
 ) -> Option<BTreeMap<&'a str, f64>> {

@@ -38,6 +38,8 @@ const TRACE_DEPTH: u32 = 2;
 const RESULTS: &str = "results.jsonl";
 /// File names of a report.
 const REPORT: [&str; 4] = ["scores.json", "report.md", "figure.svg", "figure.png"];
+/// File with the partners of a folder that holds a run per partner.
+pub(crate) const PARTNERS_FILE: &str = "partners.json";
 /// Marker file of a merge in progress. It is removed after `run.json` is written.
 const MERGING: &str = ".merging";
 /// Files in [`RECORDS`] before the first query.
@@ -151,6 +153,11 @@ fn name(path: &Path) -> &str {
     path.file_name().and_then(|n| n.to_str()).unwrap_or_default()
 }
 
+/// Returns whether the folder holds a run per partner.
+pub(crate) fn has_partners(path: &Path) -> bool {
+    !RunFolder::is_run(path) && has_entry(&path.join(PARTNERS_FILE))
+}
+
 impl RunFolder {
     /// Returns whether the folder holds a run.
     pub fn is_run(path: &Path) -> bool {
@@ -218,8 +225,11 @@ impl RunFolder {
     /// If the folder holds no run, or one of another version.
     pub fn read(path: &Path) -> Result<(RunFolder, RunOptions)> {
         let folder = RunFolder { path: path.to_owned(), _lock: None };
-        let file =
-            folder.recorded()?.ok_or_else(|| EvalError::NotARun { path: path.to_owned() })?;
+        let no_run = || match has_partners(path) {
+            true => EvalError::SeveralPartners { path: path.to_owned() },
+            false => EvalError::NotARun { path: path.to_owned() },
+        };
+        let file = folder.recorded()?.ok_or_else(no_run)?;
         Ok((folder, file.options))
     }
 

@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use chaic_agents::partners::recorded_partner_name;
 use chaic_agents::perception_factory::GROUND_TRUTH;
 use chaic_core::TaskId;
-use chaic_core::capability::PersonKind;
+use chaic_core::capability::PersonChange;
 use chaic_env::helper_registry::RULES;
 use chaic_env::rules::{RuleSet, RuleSetName};
 use chaic_env::{Digest, Track};
@@ -48,9 +49,9 @@ pub struct RunOptions {
     /// Helper program that drives the partner; absent for the rule-based partner.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub partner: Option<String>,
-    /// Kind of person of the partner; absent for the one in each episode.
+    /// Change of the partner's body; absent for the person in each episode.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub partner_is: Option<PersonKind>,
+    pub partner_is: Option<PersonChange>,
     /// Light and colors of scenes; absent for the benchmark's default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub appearance: Option<String>,
@@ -108,7 +109,7 @@ pub struct RunRequest {
     /// `--partner`.
     pub partner: Option<String>,
     /// `--person`.
-    pub partner_is: Option<PersonKind>,
+    pub partner_is: Option<PersonChange>,
     /// `--appearance`.
     pub appearance: Option<Appearance>,
     /// `--perception`.
@@ -213,7 +214,8 @@ impl RunRequest {
         }
         let (first, rules) = (self.first, self.rules.unwrap_or(RuleSetName::Paper));
         let (set, traces) = (self.set.clone(), !self.no_traces);
-        let partner = self.partner.clone().filter(|name| name != RULES);
+        let partner =
+            self.partner.as_deref().filter(|name| *name != RULES).map(recorded_partner_name);
         let appearance = self.appearance.filter(|a| *a != Appearance::Canonical);
         let options = RunOptions {
             tasks,
@@ -271,7 +273,7 @@ impl RunRequest {
             ),
             (
                 "--partner",
-                self.partner.clone(),
+                self.partner.as_deref().map(recorded_partner_name),
                 recorded.partner.clone().unwrap_or_else(|| RULES.to_owned()),
             ),
             (

@@ -11,7 +11,7 @@ use chaic_agents::memory::Memory;
 use chaic_agents::partners::{self, PARTNER_GRANTS};
 use chaic_agents::perception_factory::{GROUND_TRUTH, PerceptionFactory};
 use chaic_agents::policies::{
-    Deviation, PartnerVariantPolicy, RandomPolicy, RulePolicy, RuleProfile,
+    PartnerHabits, PartnerVariantPolicy, RandomPolicy, RulePolicy, RuleProfile,
 };
 use chaic_core::observation::Grants;
 use chaic_core::rng::RngStream;
@@ -206,7 +206,7 @@ fn windows_of_episode(
     let persona = setup.people.first().map_or(task.info().partner.persona, |p| p.persona);
     // Partners that follow the rules never wait.
     let policy: Box<dyn Policy> = if index % WAITING_SHARE == WAITING_SHARE - 1 {
-        Box::new(PartnerVariantPolicy::new(Deviation::Slow))
+        Box::new(PartnerVariantPolicy::new(PartnerHabits::SLOW))
     } else {
         Box::new(partners::policy(persona, task.info().scene))
     };

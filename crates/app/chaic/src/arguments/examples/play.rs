@@ -158,8 +158,8 @@ pub(super) const EXAMPLES: &[CommandExamples] = &[
                 "chaic episodes seal --secret secret.txt --out sealed",
             ),
             (
-                "Seal ten episodes of one task",
-                "chaic episodes seal --secret secret.txt --task obstacle --n-episodes 10 --out sealed",
+                "Seal one task, and ten partners",
+                "chaic episodes seal --secret secret.txt --task obstacle --n-partners 10 --out sealed",
             ),
             (
                 "Play them",

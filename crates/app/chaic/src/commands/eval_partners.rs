@@ -1,0 +1,189 @@
+//! `chaic eval --partners`: a run per partner in one folder, and the robustness report.
+
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::{Result, bail};
+use chaic_env::helper_registry::NONE;
+use chaic_env::partner_suite::{MAX_FILE_BYTES, PartnerSuite, SUITE, SuitePartner};
+use chaic_eval::EvalError;
+use chaic_eval::run::{FolderMode, Run, RunFolder, RunRequest};
+use chaic_eval::suite::{Robustness, SuiteFolder};
+use chaic_files::read_user_file;
+use chaic_llm::language::{is_language_helper, is_language_partner};
+use chaic_sandbox::Launcher;
+use serde_json::json;
+
+use super::eval::{Played, Session, free_folder, request, write_reports};
+use crate::arguments::{EvalArguments, LanguageArguments};
+use crate::exit::ExitStatus;
+use crate::output::{OutputFormat, counted, print_error, print_result, print_warning, quoted_path};
+
+/// Plays a benchmark with several partners.
+///
+/// # Errors
+/// If the options or the partners are invalid, or a file can't be read or written.
+pub(super) fn run(
+    arguments: &EvalArguments,
+    format: OutputFormat,
+    launcher: &Launcher,
+) -> Result<ExitStatus> {
+    let given = arguments.partners.as_deref().map(read_partners).transpose()?;
+    let path = arguments.out.clone().map_or_else(|| free_folder("partners"), Ok)?;
+    let session = Session::new(arguments, launcher)?;
+    let start = Instant::now();
+    let folder = match given {
+        Some(suite) if !arguments.resume => start_runs(&session, arguments, &path, suite)?,
+        given => resumed(&path, given.as_ref())?,
+    };
+    let request = if arguments.resume { request(arguments).0 } else { RunRequest::default() };
+    let mut is_whole = true;
+    let mut n_errors = 0;
+    for entry in folder.partners() {
+        let part = partner_arguments(arguments, &folder.run_path(&entry), &entry)?;
+        let request = partner_request(&request, &entry);
+        match session.play(&part, &folder.run_path(&entry), &request, Some(&entry.name))? {
+            Played::Stopped => return Ok(ExitStatus::Interrupted),
+            Played::Part(run) => {
+                n_errors += run.progress().errors;
+                is_whole = false;
+            }
+            Played::Whole(run) => {
+                n_errors += run.progress().errors;
+                write_reports(&run)?;
+            }
+        }
+    }
+    if is_whole {
+        print_robustness(&folder, format, Some(start))?;
+    } else {
+        print_error(&format!(
+            "shard {} is played with every partner; join the shards with: chaic merge --out WHOLE {} ...",
+            session.shard,
+            quoted_path(folder.path()),
+        ));
+    }
+    Ok(ExitStatus::from_findings(n_errors > 0))
+}
+
+/// Returns the bundled suite, or the list in a file.
+fn read_partners(list: &str) -> Result<PartnerSuite> {
+    if list == SUITE {
+        return Ok(PartnerSuite::bundled());
+    }
+    let path = Path::new(list);
+    if !path.exists() {
+        let text = format!("--partners {list}: no such file; give `{SUITE}` or a list of partners");
+        return Err(EvalError::Options(text).into());
+    }
+    Ok(PartnerSuite::parse(&read_user_file(path, MAX_FILE_BYTES)?, list)?)
+}
+
+/// Starts a run per partner. Nothing is written if one of them is not possible.
+fn start_runs(
+    session: &Session<'_>,
+    arguments: &EvalArguments,
+    path: &Path,
+    suite: PartnerSuite,
+) -> Result<SuiteFolder> {
+    let (request, _) = request(arguments);
+    if request.helpers.as_ref().is_some_and(|names| !names.iter().any(|name| name == NONE)) {
+        let text =
+            "--partners measures gains over no helper; add none, for example --helper none,rhp";
+        return Err(EvalError::Options(text.to_owned()).into());
+    }
+    for entry in suite.with_ordinary() {
+        let run = path.join(&entry.name);
+        let part = partner_arguments(arguments, &run, &entry)?;
+        session.with_helpers(&part, &run, |helpers, _| {
+            Ok(Run::check(&run, &partner_request(&request, &entry), helpers)?)
+        })?;
+    }
+    let folder = SuiteFolder::start(path, suite)?;
+    for entry in folder.partners() {
+        let run = folder.run_path(&entry);
+        let part = partner_arguments(arguments, &run, &entry)?;
+        session.with_helpers(&part, &run, |helpers, _| {
+            Run::open(&run, FolderMode::Resume, &partner_request(&request, &entry), helpers)?;
+            Ok(())
+        })?;
+    }
+    Ok(folder)
+}
+
+/// Returns the folder of runs that are resumed.
+fn resumed(path: &Path, given: Option<&PartnerSuite>) -> Result<SuiteFolder> {
+    if RunFolder::is_run(path) {
+        bail!(
+            "{} is a run with one partner; omit --partners to resume it, or choose another --out",
+            path.display()
+        );
+    }
+    if !SuiteFolder::is_suite(path) {
+        RunFolder::check_started(path)?;
+    }
+    let folder = SuiteFolder::read(path)?;
+    if let Some(suite) = given {
+        folder.check_partners(suite)?;
+    }
+    folder.check_started()?;
+    Ok(folder)
+}
+
+/// Returns the options of the command for the run with one partner, which is resumed if it exists.
+fn partner_arguments(
+    arguments: &EvalArguments,
+    run: &Path,
+    entry: &SuitePartner,
+) -> Result<EvalArguments> {
+    let is_started = RunFolder::is_run(run);
+    let recorded = if is_started { Some(RunFolder::read(run)?.1) } else { None };
+    let helpers = arguments.helper_names().or(recorded.map(|options| options.helpers));
+    let asks_model = helpers.iter().flatten().any(|name| is_language_helper(name))
+        || entry.partner.as_deref().is_some_and(is_language_partner);
+    // Only some of the partners may be language models.
+    let language =
+        if asks_model { arguments.language.clone() } else { LanguageArguments::default() };
+    Ok(EvalArguments {
+        partner: entry.partner.clone(),
+        person: entry.person,
+        partners: None,
+        out: Some(run.to_owned()),
+        resume: is_started,
+        language,
+        ..arguments.clone()
+    })
+}
+
+fn partner_request(request: &RunRequest, entry: &SuitePartner) -> RunRequest {
+    RunRequest { partner: entry.partner.clone(), partner_is: entry.person, ..request.clone() }
+}
+
+/// Writes and prints the robustness report of complete runs.
+///
+/// # Errors
+/// If a file can't be read or written.
+pub(super) fn print_robustness(
+    folder: &SuiteFolder,
+    format: OutputFormat,
+    start: Option<Instant>,
+) -> Result<()> {
+    let (runs, warnings) = folder.runs()?;
+    warnings.iter().for_each(|warning| print_warning(&warning.to_string()));
+    let robustness = Robustness::from_runs(&runs);
+    folder.write_report(&robustness)?;
+    let json = json!({
+        "run": folder.path(),
+        "report": folder.report_path(),
+        "robustness": serde_json::to_value(&robustness)?,
+    });
+    let mut text = robustness.text(chaic_eval::report::Format::Table);
+    text += &format!("\nReport:  {}\n", quoted_path(&folder.report_path()));
+    let runs = counted(runs.len(), "run");
+    text += &format!("Runs:    {} ({runs}, one per partner)\n", quoted_path(folder.path()));
+    if let Some(start) = start {
+        let secs = start.elapsed().as_secs();
+        text += &format!("Time:    {} min {:02} s\n", secs / 60, secs % 60);
+    }
+    print_result(format, &json, &text)
+}

@@ -1,0 +1,56 @@
+//! Checks of a folder with several partners, beside the checks of its runs.
+
+use chaic_files::{entries, read_bounded};
+
+use super::{PartnerRun, REPORT, Robustness, SuiteFolder};
+use crate::error::Result;
+use crate::run::{PARTNERS_FILE, RunOptions};
+use crate::verify::Finding;
+
+impl SuiteFolder {
+    /// Returns the problems of the folder: runs whose options differ in more than the partner, other
+    /// entries, and a report that differs from the results.
+    ///
+    /// # Errors
+    /// If a file can't be read.
+    pub fn findings(&self, runs: &[PartnerRun]) -> Result<Vec<Finding>> {
+        let mut findings = Vec::new();
+        let mut add = |name: &str, problem: String| {
+            findings.push(Finding { path: self.path.join(name), problem });
+        };
+        let text = self.suite.to_json();
+        if read_bounded(&self.path.join(PARTNERS_FILE), text.len() as u64 + 1)? != text.as_bytes() {
+            add(PARTNERS_FILE, "its form differs from what chaic writes".to_owned());
+        }
+        let ordinary = runs.first().map(|run| &run.options);
+        for run in runs {
+            let expected = ordinary.map(|options| RunOptions {
+                partner: run.partner.partner.clone(),
+                partner_is: run.partner.person,
+                ..options.clone()
+            });
+            if expected.as_ref() != Some(&run.options) {
+                let problem = "its options are not those of the other runs with this partner";
+                add(&run.partner.name, problem.to_owned());
+            }
+        }
+        for path in entries(&self.path)? {
+            let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+            let is_known = name == PARTNERS_FILE
+                || REPORT.contains(&name)
+                || runs.iter().any(|run| run.partner.name == name);
+            if !is_known {
+                add(name, "it is no file of a folder with several partners".to_owned());
+            }
+        }
+        let (missing, altered) = self.differing_files(&Robustness::from_runs(runs))?;
+        for name in missing {
+            add(name, "it is missing; write it with chaic eval --resume".to_owned());
+        }
+        for name in altered {
+            add(name, "it differs from the results".to_owned());
+        }
+        findings.sort();
+        Ok(findings)
+    }
+}

@@ -22,6 +22,7 @@ pub mod report;
 pub mod scene;
 pub mod shell;
 pub mod show;
+pub mod study;
 pub mod train;
 pub mod verify;
 pub mod view;

@@ -4,6 +4,7 @@ mod check;
 mod learn;
 mod look;
 mod play;
+mod study;
 
 /// A purpose, and the command line.
 type Example = (&'static str, &'static str);
@@ -22,5 +23,7 @@ const ROOT: &[CommandExamples] = &[(
 
 /// Returns all commands with their examples.
 pub(super) fn examples() -> impl Iterator<Item = &'static CommandExamples> {
-    [ROOT, play::EXAMPLES, look::EXAMPLES, learn::EXAMPLES, check::EXAMPLES].into_iter().flatten()
+    [ROOT, play::EXAMPLES, study::EXAMPLES, look::EXAMPLES, learn::EXAMPLES, check::EXAMPLES]
+        .into_iter()
+        .flatten()
 }

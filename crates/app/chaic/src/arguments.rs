@@ -119,7 +119,7 @@ pub enum Command {
     View(ViewArguments),
     /// Write a page in which a person plays episodes, as partner or helper.
     Play(PlayArguments),
-    /// Studies in which people play in a browser: check, build, export, delete; docs/studies.md.
+    /// Studies with people who play episodes in a browser; docs/studies.md.
     #[command(subcommand)]
     Study(StudyCommand),
     /// Render one frame of an episode: color, depth, ids, classes and normals.

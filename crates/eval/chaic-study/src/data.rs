@@ -20,8 +20,6 @@ const MAX_RECORDS: usize = 500_000;
 const ALPHABET: &[u8] = b"ABCDEFGHJKLMNPQRSTUVWXYZ23456789";
 /// Number of characters of a participant code.
 const CODE_LENGTH: usize = 10;
-/// A participant code for messages.
-pub const EXAMPLE_CODE: &str = "K7QXM2RBTA";
 
 /// End of a trial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -33,7 +33,7 @@ pub enum StudyError {
         problem: String,
     },
     /// The text is no participant code.
-    #[error("`{0}` is no participant code: a code has 10 letters and digits, for example {example}", example = crate::data::EXAMPLE_CODE)]
+    #[error("`{0}` is no participant code; a code has 10 letters and digits, such as K7QXM2RBTA")]
     Code(String),
     /// The folder for an export is not empty.
     #[error("{path} is not empty; name a new folder", path = path.display())]

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use chaic_core::AgentId;
-use chaic_env::trace::{Trace, parse};
+use chaic_env::trace::{Trace, TraceWarning, parse};
 use chaic_env::{EpisodeConfig, Playback};
 use chaic_eval::verify::verify;
 use chaic_files::{EntryKind, FileError, entries, kind, write_atomically};
@@ -294,14 +294,15 @@ fn check_trace(
 ) -> std::result::Result<CheckedTrace, String> {
     let text = |error: &dyn std::fmt::Display| error.to_string();
     let (trace, warnings) = parse(played.trace.as_bytes(), path).map_err(|e| text(&e))?;
-    if let Some(warning) = warnings.first() {
+    // An episode that was stopped has no end.
+    if let Some(warning) = warnings.iter().find(|w| matches!(w, TraceWarning::Torn { .. })) {
         return Err(warning.to_string());
     }
     if let Some(problem) = header_problem(plan, trial, &trace) {
         return Err(problem);
     }
-    if (played.end == Some(TrialEnd::Ended)) != trace.end().is_some() {
-        return Err("the recorded outcome is not that of the trace".to_owned());
+    if played.end == Some(TrialEnd::Ended) && trace.end().is_none() {
+        return Err("the episode has ended, but its trace has no end".to_owned());
     }
     let episode = &plan.episodes()[trial.episode];
     if let Some(mismatch) = verify(&trace, episode, path).map_err(|e| text(&e))? {

@@ -139,14 +139,14 @@ fn altered_traces_are_exported_as_not_verified() {
         (4, "turn_left", "turn_right"),
         (3, "\"helper\":\"none\"", "\"helper\":\"rhp\""),
         (3, "\"input\":\"plans\"", "\"input\":\"steps\""),
-        (4, "{", "?"),
+        (4, "[2,", "[?,"),
     ] {
         let mut records = records(&plan, CODE, 1);
         let altered = text(&records[k]).replacen(old, new, 1);
         assert_ne!(altered, text(&records[k]), "{old}");
         records[k]["text"] = json!(altered);
         let file = write(dir.path(), "a.jsonl", &records);
-        let out = dir.path().join(format!("out-{new}").replace(['"', ':', '?'], "-"));
+        let out = dir.path().join(format!("out-{new}").replace(['"', ':', '?', '[', ','], "-"));
         let report = export(&plan, &[file], &out).expect("valid records");
         assert_eq!(
             (report.traces, report.verified.len(), report.problems.len()),

@@ -3,6 +3,7 @@
 
 import "./compare.js";
 import type { ChaicCompare } from "./compare.js";
+import { embedded, moduleBytes, workerSource } from "./embedded.js";
 import { startGame, type Pace } from "./game.js";
 import type { LiveConfig } from "./messages.js";
 import type { GameResult } from "./play.js";
@@ -24,16 +25,6 @@ interface Shown {
   frame: number;
 }
 
-const MODULE_ID = "chaic-module";
-const WORKER_ID = "chaic-worker";
-
-/** Decodes the base64 text of an element and decompresses it (raw deflate). */
-async function embedded(element: Element): Promise<ArrayBuffer> {
-  const bytes = Uint8Array.from(atob(element.textContent!.trim()), (c) => c.charCodeAt(0));
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
-  return new Response(stream).arrayBuffer();
-}
-
 /** What the page's address names: `#2@310` is frame 310 of the third replay, `#2+0@310` the same beside the first. */
 function address(): Shown {
   const [, replay, other, frame] = /^#(\d+)(?:\+(\d+))?@(\d+)$/.exec(location.hash) ?? [];
@@ -44,8 +35,6 @@ function address(): Shown {
   };
 }
 
-const moduleBytes = (): Promise<ArrayBuffer> => embedded(document.getElementById(MODULE_ID)!);
-const workerSource = (): string => document.getElementById(WORKER_ID)!.textContent!;
 const encoder = new TextEncoder();
 
 /** Replays of a page and the element that shows them. */

@@ -5,6 +5,7 @@ import { property, query, state } from "lit/decorators.js";
 import { clock } from "./frames.js";
 import type { Action, Branch, LiveConfig, LiveInfo, LiveState, Request, Response, StoryLine } from "./messages.js";
 import { drawnSize, MAX_PX, paint } from "./pictures.js";
+import { SCAN_MS } from "./study/scanner.js";
 import { styles } from "./styles.js";
 
 /** Side of the images in which a person points at objects, pixels. */
@@ -13,8 +14,8 @@ const POINTING_PX = 512;
 const REFERENCES = ["none", "rhp", "oracle"];
 /** Duration of a pause in live play, frames. */
 const PAUSE_FRAMES = 3;
-/** Time for which each button is offered to users of a single switch, milliseconds. */
-const SCAN_MS = 1500;
+/** Simulated time after which a study gets the next lines of the trace, frames. */
+const RECORD_FRAMES = 15;
 
 /** What is played. */
 export interface Game {
@@ -27,6 +28,8 @@ export interface Game {
   speed: number;
   /** Recorded beginning. */
   branch?: Branch;
+  /** True in a study: the trace is passed on while it grows, and no results of others are shown. */
+  isStudy?: boolean;
 }
 
 /** Result of a finished episode, for the page around it. */
@@ -68,6 +71,11 @@ export class ChaicPlay extends LitElement {
   private lastTime = 0;
   private elapsedFrames = 0;
   private scanTimer = 0;
+  /** Length of the trace that a study has, characters. */
+  private recordedLength = 0;
+  private recordedFrame = 0;
+  /** Number of requests for the trace without a response. */
+  private nTraceRequests = 0;
 
   override disconnectedCallback(): void {
     super.disconnectedCallback();
@@ -87,6 +95,7 @@ export class ChaicPlay extends LitElement {
     this.story = [];
     this.references = new Map();
     this.isOver = false;
+    this.recordedLength = this.recordedFrame = this.nTraceRequests = 0;
   }
 
   private open(game: Game): void {
@@ -95,7 +104,7 @@ export class ChaicPlay extends LitElement {
     this.worker = new Worker(url);
     URL.revokeObjectURL(url);
     this.worker.onmessage = (event: MessageEvent<Response>) => this.receive(event.data);
-    this.worker.onerror = (event) => (this.problem = event.message || "the worker has stopped");
+    this.worker.onerror = (event) => this.fail(event.message || "the worker has stopped");
     const { module, episode, config, branch } = game;
     this.post({ type: "play", module, episode, config, branch });
   }
@@ -117,16 +126,24 @@ export class ChaicPlay extends LitElement {
         paint(this.canvas, response.view);
         break;
       case "trace":
-        this.finish(response.trace);
+        this.nTraceRequests -= 1;
+        if (this.game?.isStudy) this.record(response.trace);
+        if (this.isOver && this.nTraceRequests === 0) this.finish(response.trace);
         break;
       case "reference":
         this.references = new Map(this.references).set(response.helper, response.rate);
         this.compareNext();
         break;
       case "error":
-        this.problem = response.message;
+        this.fail(response.message);
         break;
     }
+  }
+
+  private fail(problem: string): void {
+    this.problem = problem;
+    // A study goes on with the next episode.
+    if (this.game?.isStudy) this.dispatchEvent(new CustomEvent("over", { detail: "left" }));
   }
 
   private begin(): void {
@@ -148,6 +165,8 @@ export class ChaicPlay extends LitElement {
       this.elapsedFrames -= frames;
       const viewPx = drawnSize(this.canvas, MAX_PX.view);
       this.post({ type: "advance", frames, viewPx, input: this.input });
+      // A decision is recorded at once.
+      if (this.input) this.recordedFrame = -RECORD_FRAMES;
       this.input = undefined;
     } else if (isWaiting) {
       this.elapsedFrames = Math.min(this.elapsedFrames, 1);
@@ -161,11 +180,15 @@ export class ChaicPlay extends LitElement {
   }
 
   private show(shown: LiveState): void {
-    const wasWaiting = this.shown?.status === "waiting";
+    const isNewTurn = shown.status === "waiting" && this.shown?.status !== "waiting";
     this.shown = shown;
     if (shown.events.length > 0) this.story = [...this.story, ...shown.events];
     if (shown.status === "ended") this.stop();
-    if (shown.status === "waiting" && !wasWaiting) void this.updateComplete.then(() => this.focusChoices());
+    else if (this.game?.isStudy && (isNewTurn || shown.frame - this.recordedFrame >= RECORD_FRAMES)) {
+      this.recordedFrame = shown.frame;
+      this.requestTrace();
+    }
+    if (isNewTurn) void this.updateComplete.then(() => this.focusChoices());
   }
 
   /** Moves the focus to the first plan, unless the person is elsewhere on the page. */
@@ -177,12 +200,30 @@ export class ChaicPlay extends LitElement {
 
   /** Ends the game; its trace so far is complete. */
   private stop(): void {
+    if (this.isOver) return;
     this.isOver = true;
+    this.requestTrace();
+  }
+
+  private requestTrace(): void {
+    this.nTraceRequests += 1;
     this.post({ type: "trace" });
   }
 
+  /** Passes on the lines that the trace has in addition. */
+  private record(trace: string): void {
+    const added = trace.slice(this.recordedLength);
+    this.recordedLength = trace.length;
+    if (added) this.dispatchEvent(new CustomEvent<string>("recorded", { detail: added }));
+  }
+
   private finish(trace: string): void {
-    const { episode } = this.game!;
+    const { episode, isStudy } = this.game!;
+    if (isStudy) {
+      const outcome = this.shown?.status === "ended" ? "ended" : "stopped";
+      this.dispatchEvent(new CustomEvent("over", { detail: outcome }));
+      return;
+    }
     this.dispatchEvent(new CustomEvent<GameResult>("finished", { detail: { trace, episode } }));
     if (this.shown?.status === "ended") this.compareNext();
   }
@@ -265,7 +306,7 @@ export class ChaicPlay extends LitElement {
           ${shown ? this.status(shown) : nothing}
           ${this.game?.config.level === "plans" ? this.plans(shown) : this.steps(shown)}
           ${this.isOver ? nothing : html`<p><button type="button" class="link" @click=${() => this.stop()}>Stop here</button></p>`}
-          ${shown?.status === "ended" ? this.result(shown) : nothing} ${this.events()}
+          ${shown?.status === "ended" && !this.game?.isStudy ? this.result(shown) : nothing} ${this.events()}
         </div>
       </div>
     </section>`;
@@ -276,7 +317,7 @@ export class ChaicPlay extends LitElement {
     const [low, high] = info.reach_m.map((m) => m.toFixed(2));
     const goal = isHelper
       ? "The partner wants something that you do not know. Find out and help."
-      : `You are a ${info.person} and want ${info.goal.join(", ")}.`;
+      : `Your body: ${info.person}. You want ${info.goal.join(", ")}.`;
     return html`<header>
       <h2>${info.task}: you are the ${isHelper ? "helper" : "partner"}</h2>
       <p>${goal} You reach from ${low} to ${high} m and lift ${info.strength_kg.toFixed(0)} kg.</p>
@@ -308,7 +349,11 @@ export class ChaicPlay extends LitElement {
         )}
       </ol>
       ${shown?.status === "running" ? html`<p>Doing it ...</p>` : nothing}
-      <label>
+      ${this.game?.isStudy ? nothing : this.scanChoice()}`;
+  }
+
+  private scanChoice(): TemplateResult {
+    return html`<label>
         <input
           type="checkbox"
           .checked=${this.isScanning}

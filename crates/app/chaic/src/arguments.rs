@@ -14,6 +14,7 @@ mod opponent;
 mod perception;
 mod ranges;
 mod runs;
+mod study;
 mod tools;
 
 use std::ops::Range;
@@ -48,6 +49,10 @@ pub use self::perception::{
 pub use self::runs::{
     ExplainArguments, MergeArguments, PlayArguments, RenderArguments, ReplayArguments,
     ReportArguments, ShowArguments, VerifyArguments, ViewArguments,
+};
+pub use self::study::{
+    StudyBuildArguments, StudyCheckArguments, StudyCommand, StudyDeleteArguments,
+    StudyExportArguments,
 };
 pub use self::tools::{CompletionsArguments, ListCommand, ManArguments};
 
@@ -119,6 +124,9 @@ pub enum Command {
     View(ViewArguments),
     /// Write a page in which a person plays episodes, as partner or helper.
     Play(PlayArguments),
+    /// Studies with people who play episodes in a browser; docs/studies.md.
+    #[command(subcommand)]
+    Study(StudyCommand),
     /// Render one frame of an episode: color, depth, ids, classes and normals.
     Render(RenderArguments),
     /// Export a scene for other programs.

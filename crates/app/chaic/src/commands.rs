@@ -23,6 +23,7 @@ pub mod report;
 pub mod scene;
 pub mod shell;
 pub mod show;
+pub mod study;
 pub mod submit;
 pub mod train;
 pub mod verify;

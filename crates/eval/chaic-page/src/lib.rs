@@ -2,7 +2,7 @@
 //!
 //! **What it is**: [`page`] puts a [`RunSummary`], traces, episodes and the built bundle of `web/` into
 //! one file, which works offline and verifies what it shows. [`write_report`] writes the page of a run,
-//! [`play_page`] returns one in which a person plays.
+//! [`play_page`] returns one in which a person plays, [`study_page`] that of a study.
 //!
 //! **What it is not**: it plays nothing, draws nothing and knows no rules.
 
@@ -33,6 +33,7 @@ const LEVEL: u8 = 9;
 const MODULE: &[u8] = include_bytes!("../bundle/chaic_web.wasm.deflate");
 const WORKER: &str = include_str!("../bundle/worker.js");
 const SCRIPT: &str = include_str!("../bundle/page.js");
+const STUDY_SCRIPT: &str = include_str!("../bundle/study.js");
 /// Style of all pages (CSS), for light and dark displays.
 pub const STYLE: &str = include_str!("page.css");
 /// The ending selects escaping for HTML.
@@ -72,18 +73,29 @@ pub fn play_page(title: &str, episodes: &[Episode], helpers: &[&str]) -> String 
     render(context! { title, games, helpers, game_contents => contents })
 }
 
+/// Returns the HTML page of a study with this content (`chaic_study::page_content`).
+pub fn study_page(title: &str, content: &serde_json::Value) -> String {
+    let study = encoded(content.to_string().as_bytes());
+    render_with(STUDY_SCRIPT, context! { title, study })
+}
+
 /// Returns the name of an episode in the list of a page.
 fn game_title(episode: &Episode) -> String {
     format!("{}: {}", episode.setup().task.info().title, episode.id())
 }
 
-/// Renders the template with these values, the scripts and the module.
+/// Renders the template with these values, the script of replays and games, and the module.
 fn render(values: Value) -> String {
+    render_with(SCRIPT, values)
+}
+
+/// Renders the template with these values, a script and the module.
+fn render_with(script: &str, values: Value) -> String {
     let mut environment = Environment::new();
     let (name, source) = TEMPLATE;
     environment.add_template(name, source).expect("the template is valid");
     // A closing tag in a script would end it.
-    let [worker, script] = [WORKER, SCRIPT].map(|text| text.replace("</script", "<\\/script"));
+    let [worker, script] = [WORKER, script].map(|text| text.replace("</script", "<\\/script"));
     let fixed = context! { worker, script, style => STYLE, module => STANDARD.encode(MODULE) };
     let template = environment.get_template(name).expect("it was added above");
     template.render(context! { ..values, ..fixed }).expect("the template uses given values only")

@@ -5,6 +5,7 @@ mod contest;
 mod learn;
 mod look;
 mod play;
+mod study;
 
 /// A purpose, and the command line.
 type Example = (&'static str, &'static str);
@@ -23,7 +24,7 @@ const ROOT: &[CommandExamples] = &[(
 
 /// Returns all commands with their examples.
 pub(super) fn examples() -> impl Iterator<Item = &'static CommandExamples> {
-    [ROOT, play::EXAMPLES, look::EXAMPLES, learn::EXAMPLES, check::EXAMPLES, contest::EXAMPLES]
+    [ROOT, play::EXAMPLES, study::EXAMPLES, look::EXAMPLES, learn::EXAMPLES, check::EXAMPLES, contest::EXAMPLES]
         .into_iter()
         .flatten()
 }

@@ -4,6 +4,7 @@ use std::ops::RangeInclusive;
 
 use chaic_eval::run::{MAX_IMAGE_SIZE, MIN_IMAGE_SIZE};
 use chaic_learn::opponent::collect::MAX_WINDOWS;
+use chaic_study::MAX_PARTICIPANTS;
 use chaic_training::bounds::MAX_STEPS;
 use chaic_vision::behavior::config::{MAX_CLIPS, MAX_EPISODES};
 
@@ -31,5 +32,7 @@ pub(super) const CLIPS: RangeInclusive<i64> = 1..=MAX_CLIPS as i64;
 pub(super) const WINDOWS: RangeInclusive<i64> = 1..=MAX_WINDOWS as i64;
 /// Episodes from which clips or windows are collected.
 pub(super) const EPISODES: RangeInclusive<i64> = 1..=MAX_EPISODES as i64;
+/// Simulated participants of a study.
+pub(super) const PARTICIPANTS: RangeInclusive<i64> = 1..=MAX_PARTICIPANTS as i64;
 /// Steps of a training.
 pub(super) const STEPS: RangeInclusive<u64> = 1..=MAX_STEPS;

@@ -20,6 +20,7 @@ mod pictures;
 mod run_folders;
 mod sandbox;
 mod splits;
+mod studies;
 mod subprocess;
 mod training;
 

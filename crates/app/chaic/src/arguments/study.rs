@@ -1,0 +1,77 @@
+//! Options of `chaic study`.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+
+use super::ranges;
+
+/// `chaic study`.
+#[derive(Debug, Subcommand)]
+pub enum StudyCommand {
+    /// Check a study.toml: conditions, orders, length, and balance with simulated drop-outs.
+    Check(StudyCheckArguments),
+    /// Write the page of a study: one file that needs no network.
+    Build(StudyBuildArguments),
+    /// Check collected files and write verified traces and a Psych-DS data set.
+    #[command(
+        long_about = "Check collected files and write verified traces and a Psych-DS data set. The \
+                      exit code is 1 if a trace differs from its re-simulation."
+    )]
+    Export(StudyExportArguments),
+    /// Remove all data of a participant from a folder.
+    #[command(
+        long_about = "Remove all data of a participant from a folder. The exit code is 1 if an entry \
+                      cannot be searched and may still hold data."
+    )]
+    Delete(StudyDeleteArguments),
+}
+
+/// `chaic study check`.
+#[derive(Args, Debug)]
+pub struct StudyCheckArguments {
+    /// Definition of the study.
+    pub study: PathBuf,
+    /// Simulated participants, 1 to 10000 [default: those of the study].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(ranges::PARTICIPANTS))]
+    pub participants: Option<u32>,
+    /// Share of simulated participants who leave without notice, 0 to 90 percent.
+    #[arg(long, value_name = "PERCENT", default_value_t = 20, value_parser = clap::value_parser!(u8).range(0..=90))]
+    pub dropout: u8,
+}
+
+/// `chaic study build`.
+#[derive(Args, Debug)]
+pub struct StudyBuildArguments {
+    /// Definition of the study.
+    pub study: PathBuf,
+    /// Page to write.
+    #[arg(long, value_name = "FILE", default_value = "study.html")]
+    pub out: PathBuf,
+}
+
+/// `chaic study export`.
+#[derive(Args, Debug)]
+pub struct StudyExportArguments {
+    /// Files of participants (*.jsonl), or folders with such files.
+    #[arg(required = true)]
+    pub data: Vec<PathBuf>,
+    /// Definition of the study, the one from which the page was built.
+    #[arg(long, value_name = "FILE")]
+    pub study: PathBuf,
+    /// An empty folder for the data set.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Also write the verified episodes as a LeRobot data set, without practice.
+    #[arg(long)]
+    pub lerobot: bool,
+}
+
+/// `chaic study delete`.
+#[derive(Args, Debug)]
+pub struct StudyDeleteArguments {
+    /// Code of the participant, for example K7QXM2RBTA.
+    pub code: String,
+    /// Folder with collected or exported data.
+    pub folder: PathBuf,
+}

@@ -1,0 +1,97 @@
+//! Promises: a study is checked, built, exported and deleted as documented; errors are one line. The pages themselves
+//! have tests in `web`.
+
+use std::fs;
+use std::path::Path;
+
+use crate::*;
+
+const STUDY: &str = r#"title = "Shelves"
+consent = "text.txt"
+instructions = "text.txt"
+debrief = "text.txt"
+completion_code = "DONE"
+participants = 6
+timeout_minutes = 60
+design = "latin_square"
+episodes = ["high_target/test/00", "high_target/test/01"]
+
+[factors]
+helper = ["none", "rhp"]
+
+[forms]
+at_end = ["sus"]
+"#;
+const CODE: &str = "K7QXM2RBTA";
+
+fn write_study(at: &Path) {
+    fs::write(at.join("study.toml"), STUDY).expect("the disk has space");
+    fs::write(at.join("text.txt"), "Plain words.\n").expect("the disk has space");
+}
+
+#[test]
+fn a_study_is_checked_and_built() {
+    let dir = tempfile::tempdir().expect("the disk has space");
+    let at = dir.path();
+    write_study(at);
+    let check = ["study", "check", "study.toml", "--participants", "1000", "--dropout", "20"];
+    let printed = run_ok(at, &check);
+    for words in ["2 conditions for 6 slots", "helper=rhp", "1000 arrive, 20 % drop out"] {
+        assert!(printed.contains(words), "{words}: {printed}");
+    }
+    let json = run_ok(at, &[&check[..], &["--format", "json"]].concat());
+    let json: serde_json::Value = serde_json::from_str(&json).expect("it is JSON");
+    let counts = &json["simulation"];
+    let number = |name: &str| counts[name].as_u64().expect("a number");
+    assert!(number("largest") - number("smallest") <= 6, "{counts}");
+    assert!((750..850).contains(&number("completed")), "{counts}");
+
+    let printed = run_ok(at, &["study", "build", "study.toml", "--out", "page.html"]);
+    assert!(printed.contains("page.html#1 to page.html#6"), "{printed}");
+    assert!(printed.contains("contains the goals"), "{printed}");
+    let page = fs::read_to_string(at.join("page.html")).expect("a page");
+    assert!(page.contains("<chaic-study>") && !page.contains("src="));
+    run_ok(at, &["study", "build", "study.toml", "--out", "again.html"]);
+    assert!(page == fs::read_to_string(at.join("again.html")).expect("a page"), "equal bytes");
+
+    let wrong = STUDY.replace("participants = 6", "participants = 0");
+    fs::write(at.join("study.toml"), wrong).expect("the disk has space");
+    let refused = run_err(at, &["study", "build", "study.toml", "--out", "none.html"]);
+    assert!(refused.contains("study.toml: `participants` must be from 1 to 10000"), "{refused}");
+    assert_eq!(refused.lines().count(), 1, "{refused}");
+    assert!(!at.join("none.html").exists());
+}
+
+#[test]
+fn collected_files_are_exported_and_deleted() {
+    let dir = tempfile::tempdir().expect("the disk has space");
+    let at = dir.path();
+    write_study(at);
+    let json = run_ok(at, &["study", "check", "study.toml", "--format", "json"]);
+    let json: serde_json::Value = serde_json::from_str(&json).expect("it is JSON");
+    let start = serde_json::json!({
+        "type": "start", "format": "chaic-study-data", "version": 1, "chaic": "0.1.0",
+        "study": json["digest"], "code": CODE, "slot": 2,
+    });
+    fs::create_dir(at.join("data")).expect("the disk has space");
+    let file = at.join("data/any name.jsonl");
+    fs::write(&file, format!("{start}\n{{\"type\":\"complete\"}}\n")).expect("the disk has space");
+    let export = ["study", "export", "data", "--study", "study.toml", "--out"];
+    let printed = run_ok(at, &[&export[..], &["set"]].concat());
+    assert!(printed.contains("1 participant, 1 complete; 0 of 0 traces verified"), "{printed}");
+    assert!(printed.contains("5 open slots: 1, 3, 4, 5, 6"), "{printed}");
+    assert!(at.join("set/dataset_description.json").is_file());
+    let refused = run_err(at, &[&export[..], &["set"]].concat());
+    assert!(refused.contains("set is not empty"), "{refused}");
+
+    let printed = run_ok(at, &["study", "delete", CODE, "data"]);
+    assert_eq!(printed, format!("data: 1 file and 0 rows of {CODE} removed\n"));
+    assert!(!file.exists());
+    let refused = run_err(at, &["study", "delete", "../set", "data"]);
+    assert!(refused.contains("is no participant code"), "{refused}");
+
+    fs::write(&file, "{}\n").expect("the disk has space");
+    let refused = run_err(at, &[&export[..], &["other"]].concat());
+    assert!(refused.contains("any name.jsonl, line 1: no record"), "{refused}");
+    assert_eq!(refused.lines().count(), 1, "{refused}");
+}

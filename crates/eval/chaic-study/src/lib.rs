@@ -1,0 +1,39 @@
+//! Studies in which people play episodes in a browser.
+//!
+//! **What it is**: a [`Study`] is the content of `study.toml`. A [`Plan`] adds the conditions, the episodes
+//! and the digest, and assigns the trials of each slot. [`page_content`] is what the page of the study
+//! needs. [`ParticipantData`] is the file that a participant sends; [`export`] checks such files and writes
+//! data sets, [`deletion`] removes a participant. [`SlotTable`] and [`simulate`] are the slots of a running
+//! study and simulated participants.
+//!
+//! **What it is not**: it writes no HTML, receives no data and knows no names of participants.
+//!
+//! **Invariants**
+//! - The trials of a participant are a pure function of the study's digest and the slot.
+//! - Data contain no names, addresses or clock times.
+
+mod assignment;
+mod content;
+pub mod data;
+pub mod deletion;
+mod error;
+pub mod export;
+pub mod forms;
+mod plan;
+mod simulation;
+mod slots;
+mod study;
+
+pub use assignment::Assignment;
+pub use content::page_content;
+pub use data::ParticipantData;
+pub use error::{Result, StudyError};
+pub use plan::{Condition, PERSON, Plan, SEED, Trial};
+pub use simulation::{Balance, simulate};
+pub use slots::{Claim, Finish, SlotTable};
+pub use study::{
+    Design, Factors, FormPlan, Input, MAX_PARTICIPANTS, PlaySettings, Seat, Study, WorldPace,
+};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,336 @@
+// Tests of the page of a study in Chromium: CHAIC names the command, CHROMIUM the browser.
+//
+// Promises: nothing is stored before the consent; a participation by keyboard alone gives data that
+// `chaic study export` verifies; a reload loses nothing and goes on at the checkpoint; stopping deletes all
+// data; one switch suffices; axe finds nothing, and nothing is wider than the page.
+
+import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { after, before, test } from "node:test";
+import { deflateRawSync, inflateRawSync } from "node:zlib";
+import { chromium } from "playwright-core";
+
+const chaic = process.env.CHAIC ?? "chaic";
+const executablePath = process.env.CHROMIUM ?? "/usr/bin/chromium";
+const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+const folder = mkdtempSync(join(tmpdir(), "chaic-study-"));
+const definition = join(folder, "study.toml");
+const file = join(folder, "study.html");
+
+const STUDY = `title = "Help with high shelves"
+consent = "consent.txt"
+instructions = "instructions.txt"
+debrief = "debrief.txt"
+completion_code = "SHELVES-7"
+participants = 8
+timeout_minutes = 60
+design = "latin_square"
+practice = ["no_constraint/train/00"]
+episodes = ["low_target/test/00", "low_target/test/01"]
+
+[play]
+speed = 8
+
+[factors]
+helper = ["none", "rhp"]
+
+[forms]
+after_condition = ["nasa_tlx", "trust"]
+at_end = ["sus"]
+`;
+
+let browser;
+
+before(async () => {
+  for (const name of ["consent", "instructions", "debrief"]) {
+    writeFileSync(join(folder, `${name}.txt`), `Plain words of the ${name}.\n\n- one\n- two\n`);
+  }
+  writeFileSync(definition, STUDY);
+  execFileSync(chaic, ["study", "build", definition, "--out", file]);
+  browser = await chromium.launch({ executablePath, args: ["--no-sandbox"] });
+});
+
+after(async () => {
+  await browser?.close();
+  rmSync(folder, { recursive: true });
+});
+
+/** Opens the page in a browser profile of its own. */
+async function open(hash, { path = file, ...options } = {}) {
+  const context = await browser.newContext({ viewport: { width: 1280, height: 900 }, ...options });
+  const page = await context.newPage();
+  page.on("pageerror", (error) => assert.fail(error.message));
+  page.on("request", (request) => assert.match(request.url(), /^(file|blob|data):/));
+  await page.goto(`file://${path}${hash}`);
+  await page.locator("chaic-study h1").waitFor();
+  return { page, context };
+}
+
+const databases = (page) => page.evaluate(async () => (await indexedDB.databases()).length);
+const records = (page) => page.evaluate(() => document.querySelector("chaic-study").log.records);
+
+/** Moves the focus by Tab to an element whose text or label matches, and presses a key there. */
+async function tabTo(page, wanted, key = "Enter") {
+  for (let n = 0; n < 80; n++) {
+    await page.keyboard.press("Tab");
+    const name = await page.evaluate(() => {
+      let focused = document.activeElement;
+      while (focused?.shadowRoot?.activeElement) focused = focused.shadowRoot.activeElement;
+      return `${focused?.textContent.trim()} ${focused?.getAttribute("aria-label") ?? ""}`;
+    });
+    if (wanted.test(name)) {
+      await page.keyboard.press(key);
+      return;
+    }
+  }
+  assert.fail(`no element ${wanted}`);
+}
+
+const heading = (page, text) => page.getByRole("heading", { level: 1, name: text }).waitFor();
+
+/** Selects the first plan until a frame. */
+async function play(page, frame) {
+  await page.waitForFunction(
+    (until) => {
+      const play = document.querySelector("chaic-play");
+      if (play?.shown?.status === "waiting") {
+        play.shadowRoot.querySelector("section").dispatchEvent(new KeyboardEvent("keydown", { key: "1" }));
+      }
+      return play?.shown?.frame >= until;
+    },
+    frame,
+    { timeout: 60_000, polling: 30 },
+  );
+}
+
+/** Presses the key of the first plan until a frame. */
+async function playByKeys(page, frame) {
+  for (;;) {
+    const shown = await page.evaluate(() => document.querySelector("chaic-play")?.shown);
+    if (shown?.frame >= frame) return;
+    if (shown?.status === "waiting") await page.keyboard.press("1");
+    await page.waitForTimeout(50);
+  }
+}
+
+/** Answers a form by keyboard: the first rating of each item, then one step to the right. */
+async function answer(page, n) {
+  for (let k = 0; k < n; k++) {
+    await tabTo(page, /^\s*\d+, /, "Space");
+    await page.keyboard.press("ArrowRight");
+  }
+  await tabTo(page, /^Continue/);
+}
+
+/** Plays and stops the trial that the page offers, by keyboard. */
+async function trial(page, text) {
+  await heading(page, text);
+  await tabTo(page, /^Start the episode/);
+  await playByKeys(page, 60);
+  await tabTo(page, /^Stop here/);
+  await page.locator("#continue").waitFor();
+  await tabTo(page, /^Continue/);
+}
+
+test("a participation by keyboard alone gives data that verify", async () => {
+  const { page, context } = await open("#3");
+  assert.equal(await databases(page), 0, "nothing is stored before the consent");
+  await tabTo(page, /^I agree/);
+  await heading(page, "Instructions");
+  assert.equal(await databases(page), 1);
+  await tabTo(page, /^Continue/);
+  await trial(page, /^Episode 1 of 3, practice$/);
+  for (const title of [/^Episode 2 of 3$/, /^Episode 3 of 3$/]) {
+    await trial(page, title);
+    await heading(page, "Workload");
+    await answer(page, 6);
+    await heading(page, "Trust");
+    await answer(page, 3);
+  }
+  await heading(page, "Usability");
+  // A form without answers warns once.
+  await tabTo(page, /^Continue/);
+  assert.match(await page.getByRole("alert").innerText(), /10 questions have no answer/);
+  await tabTo(page, /^Continue/);
+  await heading(page, "The end");
+  assert.match(await page.locator("chaic-study").innerText(), /SHELVES-7/);
+  const [download] = await Promise.all([page.waitForEvent("download"), tabTo(page, /^Download/)]);
+  const data = join(folder, download.suggestedFilename());
+  await download.saveAs(data);
+  const text = readFileSync(data, "utf8");
+  assert.match(download.suggestedFilename(), /^[A-Z2-9]{10}\.jsonl$/);
+  const [personal] = /Mozilla|Chrom|Linux|20\d\d-\d\d-\d\d|\d\d:\d\d:\d\d/.exec(text) ?? [];
+  assert.equal(personal, undefined, "the data have no browser and no clock time");
+
+  const out = join(folder, "set");
+  const command = ["study", "export", data, "--study", definition, "--out", out, "--lerobot", "--format", "json"];
+  const report = JSON.parse(execFileSync(chaic, command, { encoding: "utf8" }));
+  assert.deepEqual([report.participants, report.completed, report.traces, report.verified], [1, 1, 3, 3]);
+  assert.ok(!report.open_slots.includes(3));
+  const code = download.suggestedFilename().slice(0, 10);
+  const trace = join(out, "traces", code, "trial-01.jsonl");
+  const verified = execFileSync(chaic, ["verify", trace, "--format", "json"], { encoding: "utf8" });
+  assert.equal(JSON.parse(verified).passed, true);
+  const scores = readFileSync(join(out, "data", `study-${digest(text)}_description-scores_data.csv`), "utf8");
+  const workload = scores.split("\n").filter((row) => row.includes("nasa_tlx"));
+  assert.deepEqual(workload.map((row) => row.split(",").at(-1)), ["5", "5"], "the second rating of each item");
+  const lerobot = join(out, "lerobot-partner");
+  assert.equal(JSON.parse(readFileSync(join(lerobot, "meta/info.json"), "utf8")).total_episodes, 2, "no practice");
+  rmSync(lerobot, { recursive: true });
+  execFileSync(chaic, ["study", "delete", code, out]);
+  assert.throws(() => readFileSync(trace));
+  await context.close();
+});
+
+const digest = (text) => JSON.parse(text.split("\n")[0]).study.slice(0, 8);
+
+test("a reload loses nothing and goes on at the checkpoint", async () => {
+  const { page, context } = await open("#1");
+  await page.getByRole("button", { name: "I agree" }).click();
+  await page.getByRole("button", { name: "Continue" }).click();
+  await page.getByRole("button", { name: "Start the episode" }).click();
+  await play(page, 90);
+  const before = await records(page);
+  assert.ok(before.filter((record) => record.type === "trace").length > 1, "decisions are saved while playing");
+  await page.reload();
+  await heading(page, /^Episode 2 of 3$/);
+  const kept = await records(page);
+  assert.deepEqual(kept.slice(0, before.length), before);
+  assert.deepEqual(kept.at(-1), { type: "trial_end", trial: 0, outcome: "left" });
+  const second = await context.newPage();
+  await second.goto(page.url());
+  assert.match(await second.getByRole("alert").innerText(), /open in another tab/);
+  await second.close();
+  // The trace up to the reload verifies.
+  const data = join(folder, "left.jsonl");
+  writeFileSync(data, kept.map((record) => `${JSON.stringify(record)}\n`).join(""));
+  const out = join(folder, "left");
+  const command = ["study", "export", data, "--study", definition, "--out", out, "--format", "json"];
+  const report = JSON.parse(execFileSync(chaic, command, { encoding: "utf8" }));
+  assert.deepEqual([report.completed, report.traces, report.verified], [0, 1, 1]);
+  await page.reload();
+  await heading(page, /^Episode 2 of 3$/);
+  assert.equal((await records(page)).length, kept.length, "a second reload changes nothing");
+  await context.close();
+});
+
+test("stopping deletes all data, also in an episode", async () => {
+  const { page, context } = await open("#2");
+  await page.getByRole("button", { name: "I agree" }).click();
+  await page.getByRole("button", { name: "Continue" }).click();
+  await page.getByRole("button", { name: "Start the episode" }).click();
+  await play(page, 30);
+  await page.getByRole("button", { name: "Stop and delete" }).click();
+  await page.getByRole("button", { name: "Go on with the study" }).click();
+  await page.getByRole("button", { name: "Stop and delete" }).click();
+  await page.getByRole("button", { name: "Delete and stop" }).click();
+  await heading(page, "You have stopped");
+  await page.waitForFunction(async () => (await indexedDB.databases()).length === 0);
+  await page.waitForTimeout(500);
+  assert.equal(await databases(page), 0);
+  await page.reload();
+  await heading(page, "Help with high shelves");
+  await context.close();
+});
+
+/** Returns a page whose episodes end at frame `horizon`. */
+function shortStudy(horizon) {
+  const path = join(folder, "short.html");
+  const text = readFileSync(file, "utf8").replace(/(id="chaic-study">)([^<]*)/, (_, tag, encoded) => {
+    const content = JSON.parse(inflateRawSync(Buffer.from(encoded, "base64")).toString());
+    content.episodes = content.episodes.map((line) => {
+      const episode = JSON.parse(line);
+      episode.setup.horizon = horizon;
+      return JSON.stringify(episode);
+    });
+    return tag + deflateRawSync(JSON.stringify(content)).toString("base64");
+  });
+  writeFileSync(path, text);
+  return path;
+}
+
+test("one switch suffices from the consent to the first form", async () => {
+  const { page, context } = await open("", { path: shortStudy(90) });
+  // Without a slot in the address, the page asks for it.
+  await page.getByLabel(/participant number/).fill("4");
+  await Promise.all([page.waitForEvent("load"), page.keyboard.press("Enter")]);
+  await page.getByLabel(/One switch/).check();
+  const take = async (name) => {
+    await page.waitForFunction(
+      (pattern) => {
+        let focused = document.activeElement;
+        while (focused?.shadowRoot?.activeElement) focused = focused.shadowRoot.activeElement;
+        return new RegExp(pattern).test(focused?.getAttribute("aria-label") ?? focused?.textContent.trim());
+      },
+      name,
+      { timeout: 30_000 },
+    );
+    await page.keyboard.press("Enter");
+  };
+  await take("^I agree");
+  await take("^Continue");
+  for (const title of [/^Episode 1 of 3, practice$/, /^Episode 2 of 3$/]) {
+    await heading(page, title);
+    await take("^Start the episode");
+    await page.waitForFunction(() => document.querySelector("chaic-play")?.shown?.status === "waiting");
+    await take("^(?!Stop|Continue)\\w");
+    await play(page, 90);
+    await take("^Continue");
+  }
+  await heading(page, "Workload");
+  await take("^0, very low");
+  const inputs = page.locator("fieldset").nth(1).locator("input").first();
+  await page.waitForFunction((input) => document.activeElement === input, await inputs.elementHandle());
+  assert.ok((await records(page)).some((record) => record.type === "trial_end" && record.outcome === "ended"));
+  await context.close();
+});
+
+test("axe finds nothing, and nothing is wider than the page", async () => {
+  for (const options of [
+    { viewport: { width: 1280, height: 900 } },
+    { viewport: { width: 360, height: 740 }, colorScheme: "dark" },
+  ]) {
+    const { page, context } = await open("#5", options);
+    const check = async (name) => {
+      await page.evaluate(axe);
+      const { violations } = await page.evaluate(() => window.axe.run());
+      const found = violations.map((v) => `${name}: ${v.id}: ${v.nodes.map((n) => n.html).join(" ")}`);
+      assert.deepEqual(found, [], JSON.stringify(options));
+      const width = await page.evaluate(() => document.documentElement.scrollWidth);
+      assert.ok(width <= options.viewport.width, `${name}: ${width} in ${JSON.stringify(options)}`);
+      if (process.env.SCREENSHOTS) {
+        const { width } = options.viewport;
+        await page.screenshot({ path: join(process.env.SCREENSHOTS, `${width}-${name}.png`), fullPage: true });
+      }
+    };
+    const press = (name) => page.getByRole("button", { name }).click();
+    await check("consent");
+    await press("I agree");
+    await check("instructions");
+    await press("Continue");
+    for (const k of [1, 2]) {
+      await heading(page, new RegExp(`^Episode ${k} of 3`));
+      if (k === 1) await check("trial");
+      await press("Start the episode");
+      await play(page, 20);
+      if (k === 2) await check("play");
+      await press("Stop here");
+      await press("Continue");
+    }
+    await check("form");
+    await press("Continue");
+    await check("form-warned");
+    await press("Continue");
+    await heading(page, "Trust");
+    await press("Stop and delete");
+    await check("question");
+    await press("Delete and stop");
+    await heading(page, "You have stopped");
+    await check("left");
+    await context.close();
+  }
+});

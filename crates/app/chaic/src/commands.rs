@@ -32,6 +32,7 @@ pub mod view;
 mod bars;
 mod datasets;
 mod eval_partners;
+mod eval_session;
 mod recorded;
 mod run_perception;
 mod sealed;

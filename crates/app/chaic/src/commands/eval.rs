@@ -1,32 +1,19 @@
 //! `chaic eval` without a subcommand: plays a benchmark.
 
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use anyhow::{Context as _, Result, anyhow, bail};
-use chaic_env::helper_registry::{BuiltInWithPerception, HelperRegistry};
-use chaic_eval::report::write_files;
-use chaic_eval::run::{FolderMode, Run, RunFolder, RunRequest, Shard};
+use anyhow::Result;
+use chaic_eval::run::{Run, RunFolder};
 use chaic_eval::suite::SuiteFolder;
-use chaic_learn::helpers::{NamedPolicy, PolicyRegistry};
-use chaic_llm::LanguageHelpers;
-use chaic_page::{REPORT_FILE, write_report};
+use chaic_page::REPORT_FILE;
 use chaic_sandbox::Launcher;
-use chaic_subprocess::{CommandRegistry, HelperProgram};
 
+use super::eval_partners;
+use super::eval_session::{Played, Session, free_folder, request, write_reports};
 use super::summary::{print_scores, report_of};
-use super::{bars::RunBars, eval_partners, jobs, llm, run_perception, start_threads};
-use crate::arguments::{EvalArguments, ExecArguments, HelperArgument};
+use crate::arguments::EvalArguments;
 use crate::exit::ExitStatus;
-use crate::interrupt;
-use crate::output::{
-    OutputFormat, counted, print_error, print_progress, print_warning, quoted, quoted_path,
-};
-
-/// Episodes of each task in the small benchmark: with all helpers about half a minute on two cores.
-const QUICK_EPISODES: u32 = 2;
+use crate::output::{OutputFormat, counted, print_error, quoted_path};
 
 /// Plays a benchmark.
 pub fn run(
@@ -61,158 +48,6 @@ pub fn run(
     }
 }
 
-/// State that all runs of one command share.
-pub(super) struct Session<'a> {
-    launcher: &'a Launcher,
-    stop: &'static AtomicBool,
-    jobs: usize,
-    pub shard: Shard,
-}
-
-/// A run after it was played.
-pub(super) enum Played {
-    /// All episode runs are finished.
-    Whole(Box<Run>),
-    /// The episode runs of the shard are finished.
-    Part(Box<Run>),
-    /// The user stopped it; a message is printed.
-    Stopped,
-}
-
-impl<'a> Session<'a> {
-    /// Starts the threads. A process has one session.
-    ///
-    /// # Errors
-    /// If the system refuses the threads.
-    pub fn new(arguments: &EvalArguments, launcher: &'a Launcher) -> Result<Session<'a>> {
-        let stop = interrupt::stop_flag()?;
-        let jobs = jobs(arguments.jobs);
-        start_threads(jobs)?;
-        hide_worker_panics();
-        Ok(Session { launcher, stop, jobs, shard: arguments.shard.unwrap_or(Shard::WHOLE) })
-    }
-
-    /// Plays the run in a folder. `part` names it among the runs of the command.
-    ///
-    /// # Errors
-    /// If the options are invalid, or a file can't be read or written.
-    pub fn play(
-        &self,
-        arguments: &EvalArguments,
-        path: &Path,
-        request: &RunRequest,
-        part: Option<&str>,
-    ) -> Result<Played> {
-        self.with_helpers(arguments, path, |helpers, language| {
-            let mode = if arguments.resume { FolderMode::Resume } else { FolderMode::New };
-            let (mut run, warnings) = Run::open(path, mode, request, helpers)?;
-            warn_of_run(&run, &warnings);
-            print_start(&run, path);
-            let mut bars = match part {
-                Some(part) => RunBars::for_part(run.progress(), part),
-                None => RunBars::new(run.progress()),
-            };
-            if let Some(language) = language {
-                language.listen(Box::new(bars.line_printer()));
-            }
-            let played = run.play_shard(self.shard, self.jobs, helpers, self.stop, &mut |event| {
-                bars.show(event)
-            });
-            bars.clear();
-            let folder = part.and(path.parent()).unwrap_or(path);
-            let resume = how_to_resume(folder, arguments);
-            let is_complete = played.map_err(|e| anyhow!("{e:#}\n{resume}"))?;
-            if let Some(problem) = language.and_then(LanguageHelpers::problem) {
-                bail!("paused: {problem}\n{resume}");
-            }
-            let extent = run.progress();
-            if !is_complete {
-                let done = extent.finished - extent.errors;
-                print_error(&format!(
-                    "stopped after {done} of {}",
-                    counted(extent.total, "episode run")
-                ));
-                print_error(&resume);
-                return Ok(Played::Stopped);
-            }
-            let run = Box::new(run);
-            Ok(if extent.finished < extent.total { Played::Part(run) } else { Played::Whole(run) })
-        })
-    }
-
-    /// Calls a function with the helpers of the run in a folder.
-    ///
-    /// # Errors
-    /// If a helper is unknown or can't be made, and those of the function.
-    pub fn with_helpers<T>(
-        &self,
-        arguments: &EvalArguments,
-        path: &Path,
-        then: impl FnOnce(&dyn HelperRegistry, Option<&LanguageHelpers>) -> Result<T>,
-    ) -> Result<T> {
-        let perception = run_perception::perception_of_run(arguments, path)?;
-        let built_in = BuiltInWithPerception { perception };
-        let language = llm::language(arguments, path, self.stop)?;
-        let language =
-            language.map(|language| language.with_perception(Arc::clone(&built_in.perception)));
-        let registry: &dyn HelperRegistry = match &language {
-            Some(language) => language,
-            None => &built_in,
-        };
-        let policies: chaic_env::Result<Vec<NamedPolicy>> =
-            arguments.policies().map(|(name, file)| NamedPolicy::read(name, file)).collect();
-        let policies = PolicyRegistry::bundled(registry, Arc::clone(&built_in.perception))
-            .with_policies(policies?)?;
-        let processes = confined(arguments, path, self.launcher)?;
-        let commands = CommandRegistry::new(&policies, processes, self.stop)?;
-        if arguments.resume {
-            commands.check_resumed(path)?;
-        }
-        then(&commands, language.as_ref())
-    }
-}
-
-/// Prints the extent of a run before it is played.
-fn print_start(run: &Run, path: &Path) {
-    let extent = run.progress();
-    let (tasks, names) = (&run.options().tasks, &run.options().helpers);
-    print_progress(&format!(
-        "{}: {}, {}, {} {}{}",
-        path.display(),
-        counted(extent.total, "episode run"),
-        counted(tasks.len(), "task"),
-        if names.len() == 1 { "helper" } else { "helpers" },
-        names.join(", "),
-        match extent.finished - extent.errors {
-            0 => String::new(),
-            n => format!("; finished already: {n}"),
-        }
-    ));
-}
-
-/// Prints the problems that opening a run found.
-pub(super) fn warn_of_run(run: &Run, warnings: &[impl std::fmt::Display]) {
-    for warning in warnings {
-        print_warning(&format!("{warning}; that episode is played again"));
-    }
-    if let Some(note) = run.untraced_note() {
-        print_warning(&note);
-    }
-}
-
-/// Returns the helper processes, each in its sandbox. The folder of the run is hidden from them.
-fn confined(
-    arguments: &EvalArguments,
-    run: &Path,
-    launcher: &Launcher,
-) -> Result<Vec<HelperProgram>> {
-    let mut commands = arguments.commands();
-    for command in &mut commands {
-        arguments.exec.confine(command, launcher, &[run.to_owned()])?;
-    }
-    Ok(commands)
-}
-
 /// Writes the report of a complete run and prints the short report.
 fn finish(run: &Run, format: OutputFormat, start: Instant) -> Result<ExitStatus> {
     write_reports(run)?;
@@ -235,114 +70,4 @@ fn finish(run: &Run, format: OutputFormat, start: Instant) -> Result<ExitStatus>
     }
     print_scores(format, &report, run.folder(), &more)?;
     Ok(ExitStatus::from_findings(run.progress().errors > 0))
-}
-
-/// Writes the files and the page of a report into the folder of a run.
-pub(super) fn write_reports(run: &Run) -> Result<()> {
-    let report = report_of(run);
-    write_files(run.folder(), &report)?;
-    write_report(run.folder(), &report)?;
-    Ok(())
-}
-
-/// Returns the requested run, and a name for its folder. Without any option it is the small benchmark.
-pub(super) fn request(arguments: &EvalArguments) -> (RunRequest, &'static str) {
-    let EvalArguments { task, split, episodes, n_episodes, rules, set, seeds, size, .. } =
-        arguments;
-    let request = RunRequest {
-        tasks: task.as_ref().map(|t| t.0.clone()),
-        helpers: arguments.helper_names(),
-        split: split.clone(),
-        first: *n_episodes,
-        seeds: *seeds,
-        size: *size,
-        episodes: episodes.clone(),
-        rules: *rules,
-        set: set.clone(),
-        no_traces: arguments.no_traces,
-        partner: arguments.partner.clone(),
-        partner_is: arguments.person,
-        appearance: arguments.appearance,
-        perception: arguments.perception(),
-        behavior: arguments.behavior(),
-        track: arguments.track,
-    };
-    if request == RunRequest::default() && !arguments.resume {
-        return (RunRequest { first: Some(QUICK_EPISODES), ..request }, "quick");
-    }
-    (request, "eval")
-}
-
-/// Returns the first of `runs/NAME`, `runs/NAME-2`, ... that does not exist.
-pub(super) fn free_folder(name: &str) -> Result<PathBuf> {
-    /// Limit of the search.
-    const MAX_RUNS: u32 = 10_000;
-    let numbered = |k: u32| if k == 1 { name.to_owned() } else { format!("{name}-{k}") };
-    let mut candidates = (1..MAX_RUNS).map(|k| Path::new("runs").join(numbered(k)));
-    candidates.find(|p| !p.exists()).context("every runs/... folder is taken; give one with --out")
-}
-
-/// Returns the command that continues a run.
-fn how_to_resume(path: &Path, arguments: &EvalArguments) -> String {
-    let language = llm::resume_options(&arguments.language);
-    let helpers = resume_options(arguments);
-    let shard = arguments.shard.map_or_else(String::new, |shard| format!(" --shard {shard}"));
-    format!(
-        "continue with: chaic eval --resume --out {}{shard}{helpers}{language}",
-        quoted_path(path)
-    )
-}
-
-/// Hides panic messages of workers, which would interrupt the bars. The run records and prints them.
-pub(super) fn hide_worker_panics() {
-    let default_hook = std::panic::take_hook();
-    std::panic::set_hook(Box::new(move |info| {
-        let is_worker = |name: &str| name.starts_with("chaic-worker");
-        if !std::thread::current().name().is_some_and(is_worker) {
-            default_hook(info);
-        }
-    }));
-}
-
-/// Returns the options of helper processes and policies, which a resumed run needs again.
-///
-/// The folder of a run does not decide which command runs or with which rights, and holds no weights.
-fn resume_options(arguments: &EvalArguments) -> String {
-    if arguments.commands().is_empty() && arguments.policies().next().is_none() {
-        return String::new();
-    }
-    let given = arguments.helpers().map(|helper| match helper {
-        HelperArgument::Names(names) => format!(" --helper {}", quoted(&names.join(","))),
-        HelperArgument::Exec { name, line } => {
-            format!(" --helper {}", quoted(&format!("{name}=exec:{line}")))
-        }
-        HelperArgument::Policy { name, file } => {
-            format!(" --helper {}", quoted(&format!("{name}=policy:{}", file.display())))
-        }
-    });
-    let ExecArguments {
-        exec_grants,
-        exec_decision_s,
-        exec_start_s,
-        exec_episode_s,
-        exec_memory_mib,
-        exec_env,
-        exec_read,
-        exec_trust,
-    } = &arguments.exec;
-    let granted = exec_grants.iter().map(|grants| {
-        let names = grants.named().into_iter().filter(|(_, is_given)| *is_given);
-        format!(" --exec-grants {}", names.map(|(name, _)| name).collect::<Vec<_>>().join(","))
-    });
-    let times =
-        [("decision", exec_decision_s), ("start", exec_start_s), ("episode", exec_episode_s)];
-    let times = times.into_iter().filter_map(|(name, time)| {
-        time.map(|time| format!(" --exec-{name}-s {}", time.as_secs_f64()))
-    });
-    let memory = exec_memory_mib.iter().map(|mib| format!(" --exec-memory-mib {mib}"));
-    let variables = exec_env.iter().map(|name| format!(" --exec-env {}", quoted(name)));
-    let readable = exec_read.iter().map(|path| format!(" --exec-read {}", quoted_path(path)));
-    let trust = exec_trust.then(|| " --exec-trust".to_owned());
-    let sandbox = readable.chain(trust);
-    given.chain(granted).chain(times).chain(memory).chain(variables).chain(sandbox).collect()
 }

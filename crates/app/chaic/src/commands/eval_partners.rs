@@ -14,7 +14,7 @@ use chaic_llm::language::{is_language_helper, is_language_partner};
 use chaic_sandbox::Launcher;
 use serde_json::json;
 
-use super::eval::{Played, Session, free_folder, request, write_reports};
+use super::eval_session::{Played, Session, free_folder, request, write_reports};
 use crate::arguments::{EvalArguments, LanguageArguments};
 use crate::exit::ExitStatus;
 use crate::output::{OutputFormat, counted, print_error, print_result, print_warning, quoted_path};

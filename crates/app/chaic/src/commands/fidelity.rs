@@ -16,7 +16,7 @@ use chaic_fidelity::{
 use serde_json::json;
 
 use super::bars::{RunBars, time_left};
-use super::eval::{hide_worker_panics, warn_of_run};
+use super::eval_session::{hide_worker_panics, warn_of_run};
 use super::summary::report_of;
 use super::{jobs, start_threads};
 use crate::arguments::FidelityArguments;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use chaic_agents::HelperInfo;
-use chaic_agents::partners::PartnerVariant;
+use chaic_agents::partners::{PartnerVariant, partner_habits};
 use chaic_core::capability::{IMPAIRMENTS, Persona};
 use chaic_core::observation::Grants;
 use chaic_core::task::{Origin, TASKS};
@@ -139,7 +139,8 @@ fn partners(format: OutputFormat) -> Result<()> {
             name => PartnerVariant::find(name).map_or("", |variant| variant.about),
         };
         minds.add_row([name.as_str(), description]);
-        rows.push(json!({ "name": name, "description": description }));
+        let habits = partner_habits(&name).ok().map(|habits| habits.to_string());
+        rows.push(json!({ "name": name, "description": description, "habits": habits }));
     }
     let mut suite = table(["Partner of the suite", "--partner", "--person"]);
     for SuitePartner { name, partner, person } in PartnerSuite::bundled().partners() {
@@ -149,8 +150,7 @@ fn partners(format: OutputFormat) -> Result<()> {
     let more = "`--partner NAME` selects one; also drawn:SEED and habits:.... `--person` selects the body.\n\
                 `--partners suite` plays all of the second table. docs/people.md.\n";
     let text = format!("{}\n{}\n{more}", minds.trim_fmt(), suite.trim_fmt());
-    let json = json!({ "partners": rows, "suite": PartnerSuite::bundled().partners() });
-    print_result(format, &json, &text)
+    print_result(format, &rows, &text)
 }
 
 fn rules(format: OutputFormat) -> Result<()> {

@@ -346,7 +346,7 @@ fn language_helpers_from_an_endpoint_to_the_report() {
         ),
         (&["--llm", "replay:nowhere"], "holds no record of a language model"),
         (&["--llm", "nowhere"], "write replay:DIR"),
-        (&["--partner", "llm2", "--endpoint", &url, "--model", "m"], "no_containers, llm, vlm"),
+        (&["--partner", "llm2", "--endpoint", &url, "--model", "m"], "one_by_one, llm, vlm"),
         (&["--llm-config", "short"], "can't read short"),
         // No server answers any more.
         (

@@ -31,6 +31,8 @@ const MAX_DURATION: Duration = Duration::from_secs(60);
 const MAX_MEMORY_KIB: u64 = 1 << 20;
 /// Most inputs in memory per parser.
 const MAX_POOL: usize = 512;
+/// Most different messages that are counted per parser, so that they need little memory.
+const MAX_MESSAGES: usize = 10_000;
 /// Longest input that the corpus keeps, bytes, so that the repository stays small.
 const MAX_KEPT_BYTES: usize = 2 << 10;
 /// Most inputs that the corpus keeps per parser.
@@ -180,7 +182,8 @@ fn fuzz(
                 continue;
             }
         };
-        if messages.insert(pattern(&message)) && is_changed && pool.len() < MAX_POOL {
+        let is_new = messages.len() < MAX_MESSAGES && messages.insert(pattern(&message));
+        if is_new && is_changed && pool.len() < MAX_POOL {
             if options.keep && input.len() <= MAX_KEPT_BYTES && kept.len() < MAX_KEPT {
                 keep(&folder, &input)?;
                 kept.push(input.clone());
@@ -216,10 +219,8 @@ fn parse(
     match parsed {
         Ok(Ok(())) => Ok(String::new()),
         Ok(Err(message)) if message.trim().is_empty() => Err("an empty message".to_owned()),
-        // Names in a binary file may hold line breaks, which the command escapes.
-        Ok(Err(message))
-            if target.format != Format::Binary && message.trim_end().contains('\n') =>
-        {
+        // Strings in JSON and in binary files may hold line breaks, which the command escapes.
+        Ok(Err(message)) if target.format == Format::Text && message.trim_end().contains('\n') => {
             Err(format!("a message of several lines: {message:?}"))
         }
         Ok(Err(message)) => Ok(message),

@@ -20,7 +20,7 @@ use chaic_core::rng::RngStream;
 use clap::Args;
 
 use self::inputs::Inputs;
-use self::mutate::mutate;
+use self::mutate::{Format, mutate};
 use self::targets::{TARGETS, Target};
 use crate::process_status::{peak_memory_kib, reset_peak_memory};
 
@@ -31,6 +31,8 @@ const MAX_DURATION: Duration = Duration::from_secs(60);
 const MAX_MEMORY_KIB: u64 = 1 << 20;
 /// Most inputs in memory per parser.
 const MAX_POOL: usize = 512;
+/// Most different messages that are counted per parser, so that they need little memory.
+const MAX_MESSAGES: usize = 10_000;
 /// Longest input that the corpus keeps, bytes, so that the repository stays small.
 const MAX_KEPT_BYTES: usize = 2 << 10;
 /// Most inputs that the corpus keeps per parser.
@@ -85,8 +87,7 @@ pub fn run_all(options: &FuzzOptions) -> Result<bool> {
     let inputs = Inputs::new(dir.path())?;
     let current = Arc::new(Mutex::new(Current::default()));
     watch(Arc::clone(&current), options.corpus.clone());
-    // A panic is reported with its input.
-    std::panic::set_hook(Box::new(|_| {}));
+    report_other_panics(Arc::clone(&current));
     let mut n_failures = 0;
     println!("| parser | inputs | messages | failures | memory, MiB |\n|---|--:|--:|--:|--:|");
     for target in targets {
@@ -114,6 +115,16 @@ fn select(names: &[String]) -> Result<Vec<&'static Target>> {
         bail!("no parser `{unknown}`; the parsers are {}", known.join(", "));
     }
     Ok(TARGETS.iter().filter(|t| names.is_empty() || names.iter().any(|n| n == t.name)).collect())
+}
+
+/// Prints panics outside of parsers. Those of a parser are reported with its input.
+fn report_other_panics(current: Arc<Mutex<Current>>) {
+    let print = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if current.lock().unwrap_or_else(PoisonError::into_inner).began.is_none() {
+            print(panic);
+        }
+    }));
 }
 
 /// Ends the process when one input takes too long.
@@ -171,7 +182,8 @@ fn fuzz(
                 continue;
             }
         };
-        if messages.insert(pattern(&message)) && is_changed && pool.len() < MAX_POOL {
+        let is_new = messages.len() < MAX_MESSAGES && messages.insert(pattern(&message));
+        if is_new && is_changed && pool.len() < MAX_POOL {
             if options.keep && input.len() <= MAX_KEPT_BYTES && kept.len() < MAX_KEPT {
                 keep(&folder, &input)?;
                 kept.push(input.clone());
@@ -207,7 +219,8 @@ fn parse(
     match parsed {
         Ok(Ok(())) => Ok(String::new()),
         Ok(Err(message)) if message.trim().is_empty() => Err("an empty message".to_owned()),
-        Ok(Err(message)) if message.trim_end().contains('\n') => {
+        // Strings in JSON and in binary files may hold line breaks, which the command escapes.
+        Ok(Err(message)) if target.format == Format::Text && message.trim_end().contains('\n') => {
             Err(format!("a message of several lines: {message:?}"))
         }
         Ok(Err(message)) => Ok(message),

@@ -49,8 +49,8 @@ enum Command {
         #[arg(long, requires = "path")]
         fault: Option<FaultKind>,
         /// File or folder of the operation that fails.
-        #[arg(long, default_value = "")]
-        path: PathBuf,
+        #[arg(long)]
+        path: Option<PathBuf>,
         /// Number of the operation among those on this path, 0 to 1000000000.
         #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=1_000_000_000))]
         at: u32,
@@ -70,7 +70,8 @@ fn main() -> ExitCode {
         Command::Soak(options) => soak::run(&options),
         Command::Fuzz(options) => fuzz::run_all(&options),
         Command::Chaic { fault, path, at, log, arguments } => {
-            let fault = fault.map(|kind| FaultPlan { path, index: at as usize, kind });
+            let plan = |(kind, path)| FaultPlan { path, index: at as usize, kind };
+            let fault = fault.zip(path).map(plan);
             return commands::run_chaic(fault, log.as_deref(), arguments);
         }
     };

@@ -47,8 +47,12 @@ pub fn run(options: &SoakOptions) -> Result<bool> {
     shorten(&dir.path().join("e"), options.frames)?;
     let journal = dir.path().join("run/results.jsonl");
     let began = Instant::now();
-    let (code, samples) = play(dir.path(), options.episodes.div_ceil(2), &journal);
+    let (code, mut samples) = play(dir.path(), options.episodes.div_ceil(2), &journal);
     anyhow::ensure!(code == 0, "the run ends with exit code {code}");
+    // After the last episode the report is written, with figures.
+    let n_episodes = samples.last().map_or(0, |sample| sample.n_episodes);
+    samples.retain(|sample| sample.n_episodes < n_episodes);
+    anyhow::ensure!(samples.len() >= 20, "too few samples; play more or longer episodes");
     let seconds = began.elapsed().as_secs_f64();
     println!("| episodes | memory, MiB | descriptors | threads |\n|--:|--:|--:|--:|");
     for tenth in 1..=10 {

@@ -109,7 +109,7 @@ impl Inputs {
 pub fn network() -> Network {
     let mut net = Network::default();
     let input = net.input(3);
-    let conv = net.conv("conv", input, Kernel { size: 3, stride: 2 }, 4);
+    let conv = net.conv("conv", input, Kernel { size: 3, stride: 2 }, 16);
     let norm = net.norm_relu("norm", conv);
     net.output_head("head", norm, 4);
     net
@@ -190,9 +190,9 @@ pub fn replies() -> Vec<Vec<u8>> {
 /// If the episode cannot be started.
 pub fn request_frames() -> Result<Vec<u8>> {
     let episode = find_episode("shopping/test/00")?;
-    let config = EpisodeConfig { image_size: Some(8), ..EpisodeConfig::new(&episode, "fuzz") };
+    let config = EpisodeConfig { image_size: Some(16), ..EpisodeConfig::new(&episode, "fuzz") };
     let sensors =
-        SensorConfig { image_size: 8, rgb: true, depth: true, ids: false, frame_history: None };
+        SensorConfig { image_size: 16, rgb: true, depth: true, ids: false, frame_history: None };
     let helper = Some(AgentSlot::external(Grants::NONE, sensors));
     let mut env = Env::new(config, EpisodeAgents { helper, partner: None })?;
     let briefing = env.briefing(AgentId::HELPER);

@@ -220,8 +220,8 @@ fn llm_configs() -> Vec<Vec<u8>> {
     settings.asking.model = "m".to_owned();
     settings.endpoint.url = "http://localhost:8000/v1".to_owned();
     let text = toml::to_string(&settings).expect("settings serialize to TOML");
-    let extra = "[asking.extra]\ntop_k = 5\nstop = [\"a\", \"b\"]\n";
-    vec![text.clone().into(), format!("{text}{extra}").into()]
+    let extra = "[asking]\nmodel = \"m\"\n[asking.extra]\ntop_k = 5\n[endpoint]\nurl = \"http://[::1]:1/v1\"\n";
+    vec![text.into(), extra.as_bytes().to_vec()]
 }
 
 fn llm_templates(inputs: &Inputs, bytes: &[u8]) -> Result<(), String> {

@@ -9,12 +9,11 @@ mod report;
 
 pub use report::Robustness;
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use chaic_env::partner_suite::{MAX_FILE_BYTES, PartnerSuite, SuitePartner};
 use chaic_env::trace::TraceWarning;
-use chaic_files::{EntryKind, entries, kind, read_bounded, write_atomically};
+use chaic_files::{EntryKind, create_folders, entries, kind, read_bounded, write_atomically};
 
 use crate::error::{EvalError, Result};
 use crate::metrics::RunResult;
@@ -69,7 +68,7 @@ impl SuiteFolder {
         if path.exists() && !entries(path)?.is_empty() {
             return Err(not_empty());
         }
-        fs::create_dir_all(path).map_err(EvalError::io("make the folder", path))?;
+        create_folders(path)?;
         write_atomically(&path.join(PARTNERS_FILE), suite.to_json().as_bytes())?;
         Ok(SuiteFolder { path: path.to_owned(), suite })
     }

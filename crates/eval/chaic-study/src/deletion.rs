@@ -3,7 +3,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use chaic_files::{EntryKind, FileError, read_user_file, walk, write_atomically};
+use chaic_files::{
+    EntryKind, FileError, read_user_file, remove_empty_folder, remove_file, walk, write_atomically,
+};
 
 use crate::data::is_code;
 use crate::error::{Result, StudyError};
@@ -58,9 +60,9 @@ pub fn delete(code: &str, folder: &Path) -> Result<Deleted> {
         if bytes.len() as u64 > MAX_BYTES {
             deleted.unsearched.push(entry.path);
         } else if is_named || is_file_of(code, &entry.path, &bytes) {
-            fs::remove_file(&entry.path).map_err(FileError::context("remove", &entry.path))?;
+            remove_file(&entry.path)?;
             // A folder with other files stays.
-            let _ = entry.path.parent().filter(|p| p.ends_with(code)).map(fs::remove_dir);
+            let _ = entry.path.parent().filter(|p| p.ends_with(code)).map(remove_empty_folder);
             deleted.files.push(entry.path);
         } else if contains(&bytes, code.as_bytes()) {
             deleted.rows += remove_rows(code, &entry.path, &bytes)?;

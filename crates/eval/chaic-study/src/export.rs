@@ -3,14 +3,13 @@
 mod tables;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use chaic_core::AgentId;
 use chaic_env::trace::{Trace, TraceWarning, parse};
 use chaic_env::{EpisodeConfig, Playback};
 use chaic_eval::verify::verify;
-use chaic_files::{EntryKind, FileError, entries, kind, write_atomically};
+use chaic_files::{EntryKind, create_folders, entries, kind, write_atomically};
 use serde_json::json;
 
 use crate::data::{DataRecord, ParticipantData, TrialEnd};
@@ -72,7 +71,7 @@ pub fn export(plan: &Plan, paths: &[PathBuf], out: &Path) -> Result<ExportReport
             format!("a second file of participant {}", twice.code),
         ));
     }
-    fs::create_dir_all(out).map_err(FileError::context("make the folder", out))?;
+    create_folders(out)?;
     if !entries(out)?.is_empty() {
         return Err(StudyError::NotEmpty { path: out.to_owned() });
     }
@@ -251,8 +250,7 @@ impl Participation {
                 let name = format!("{TRACES}/{}/trial-{number:02}.jsonl", self.code);
                 let path = out.join(&name);
                 let folder = out.join(TRACES).join(&self.code);
-                fs::create_dir_all(&folder)
-                    .map_err(FileError::context("make the folder", &folder))?;
+                create_folders(&folder)?;
                 write_atomically(&path, played.trace.as_bytes())?;
                 let result = check_trace(plan, trial, played, &path);
                 report.traces += 1;

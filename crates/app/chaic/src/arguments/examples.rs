@@ -24,7 +24,15 @@ const ROOT: &[CommandExamples] = &[(
 
 /// Returns all commands with their examples.
 pub(super) fn examples() -> impl Iterator<Item = &'static CommandExamples> {
-    [ROOT, play::EXAMPLES, study::EXAMPLES, look::EXAMPLES, learn::EXAMPLES, check::EXAMPLES, contest::EXAMPLES]
-        .into_iter()
-        .flatten()
+    [
+        ROOT,
+        play::EXAMPLES,
+        study::EXAMPLES,
+        look::EXAMPLES,
+        learn::EXAMPLES,
+        check::EXAMPLES,
+        contest::EXAMPLES,
+    ]
+    .into_iter()
+    .flatten()
 }

@@ -2,10 +2,9 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::fs;
 use std::path::Path;
 
-use chaic_files::{FileError, write_atomically};
+use chaic_files::{create_folders, write_atomically};
 
 use super::{CheckedTrace, description, short};
 use crate::data::TrialEnd;
@@ -166,7 +165,7 @@ impl Tables {
     /// Writes the tables and then the description of the data set.
     pub(super) fn write(&self, plan: &Plan, out: &Path) -> Result<()> {
         let folder = out.join("data");
-        fs::create_dir_all(&folder).map_err(FileError::context("make the folder", &folder))?;
+        create_folders(&folder)?;
         let tables =
             [("answers", &self.answers), ("scores", &self.scores), ("trials", &self.trials)];
         for (name, table) in tables {

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use chaic_core::capability::PersonKind;
 use chaic_core::{Frame, TaskId};
 use chaic_env::helper_registry::RULES;
 use chaic_env::trace::MAX_TRACE_BYTES;
@@ -93,9 +92,9 @@ pub struct PlayRules {
     pub size: Option<u32>,
     /// Agent that drives the partner.
     pub partner: String,
-    /// Kind of person that replaces the partner; absent for those of the episodes.
+    /// Change of the partner's body; absent for the people of the episodes.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub person: Option<PersonKind>,
+    pub person: Option<String>,
     /// Light and colors.
     pub appearance: String,
 }
@@ -188,7 +187,7 @@ impl PlayedRun {
             seeds: *seeds,
             size: *size,
             partner: partner.clone().unwrap_or_else(|| RULES.to_owned()),
-            person: *partner_is,
+            person: partner_is.map(|change| change.to_string()),
             appearance: appearance.clone().unwrap_or_else(|| Appearance::Canonical.to_string()),
         }
     }

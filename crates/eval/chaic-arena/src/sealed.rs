@@ -8,7 +8,7 @@ use chaic_env::partner_suite::{MAX_PARTNERS, PartnerSuite, SuitePartner};
 use chaic_episodes::{
     Episode, GenerateError, GeneratorSeeds, SeedRange, Settings, generate_episode,
 };
-use chaic_files::{FileError, create_folders, write_atomically};
+use chaic_files::{create_folders, write_atomically};
 use hkdf::Hkdf;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};

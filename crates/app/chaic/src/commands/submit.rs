@@ -22,7 +22,7 @@ use chaic_subprocess::conformance::check;
 use serde_json::json;
 
 use super::bars::RunBars;
-use super::eval::{hide_worker_panics, warn_of_run};
+use super::eval_session::{hide_worker_panics, warn_of_run};
 use super::recorded::RecordedHelpers;
 use super::sealed::read_commitment;
 use super::submitted::SubmittedHelpers;

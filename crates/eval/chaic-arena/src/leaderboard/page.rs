@@ -114,7 +114,7 @@ fn terms(table: &LeaderboardTable) -> Vec<(&'static str, String)> {
         ("Track", rules.track.clone()),
         ("Rules", rule_set),
         ("Partner", rules.partner.clone()),
-        ("Person", rules.person.map_or("as in the episodes".to_owned(), |kind| kind.to_string())),
+        ("Person", rules.person.clone().unwrap_or_else(|| "as in the episodes".to_owned())),
         ("Appearance", rules.appearance.clone()),
         ("Images", size),
         ("chaic", rules.chaic.clone()),

@@ -52,7 +52,7 @@ fn plan(definition: &str) -> Plan {
 fn errors_name_the_key_and_the_expectation() {
     for (old, new, words) in [
         ("title = \"Shelves\"", "title = 3", "line 1: invalid type"),
-        ("title = \"Shelves\"", "titel = \"Shelves\"", "unknown field `titel`"),
+        ("title = \"Shelves\"", "headline = \"Shelves\"", "unknown field `headline`"),
         ("title = \"Shelves\"", "title = \"\"", "`title` must be one line"),
         ("\"SHELVES-7\"", "\"A B\"", "`completion_code` must have"),
         ("participants = 48", "participants = 0", "`participants` must be from 1 to 10000, not 0"),

@@ -51,7 +51,6 @@
     border-radius: 0.25rem;
     font-weight: 600;
     padding: 0 0.375rem;
-    white-space: nowrap;
   }
   .good {
     color: var(--good);

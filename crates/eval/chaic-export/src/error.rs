@@ -8,8 +8,6 @@ use chaic_files::FileError;
 use chaic_video::VideoError;
 use parquet::errors::ParquetError;
 
-use crate::lerobot::FRAMES_PER_S;
-
 /// Error when a data set is exported.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
@@ -35,9 +33,14 @@ pub enum ExportError {
     NotEmpty(PathBuf),
     /// The sampling interval does not give a whole number of images per second.
     #[error(
-        "an interval of {0} frames does not divide a second of {FRAMES_PER_S} frames; choose a divisor of {FRAMES_PER_S}"
+        "an interval of {every} frames does not divide a second of {frames_per_s} frames; choose a divisor of {frames_per_s}"
     )]
-    Rate(u32),
+    Rate {
+        /// Sampling interval, frames.
+        every: u32,
+        /// Frames per second of the export.
+        frames_per_s: u32,
+    },
     /// The episode has no such agent.
     #[error("{0} has no {1}")]
     NoAgent(String, AgentId),

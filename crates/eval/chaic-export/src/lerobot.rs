@@ -134,7 +134,8 @@ impl LeRobotWriter {
     /// If the folder is not empty or cannot be created, or the sampling interval is invalid.
     pub fn create(folder: &Path, options: LeRobotOptions) -> Result<LeRobotWriter, ExportError> {
         if options.every == 0 || !FRAMES_PER_S.is_multiple_of(options.every) {
-            return Err(ExportError::Rate(options.every));
+            let every = options.every;
+            return Err(ExportError::Rate { every, frames_per_s: FRAMES_PER_S });
         }
         dataset_folder::create_empty(folder)?;
         Ok(LeRobotWriter {

@@ -110,6 +110,6 @@ fn invalid_options_are_reported_before_files_are_written() {
     assert!(matches!(error, Err(ExportError::NotEmpty(_))));
     let out = folder.path().join("set");
     let error = LeRobotWriter::create(&out, LeRobotOptions { every: 7, ..OPTIONS });
-    assert!(matches!(error, Err(ExportError::Rate(7))));
+    assert!(matches!(error, Err(ExportError::Rate { every: 7, .. })));
     assert!(!out.exists());
 }

@@ -146,7 +146,7 @@ mod tests {
         let error = write_new_private(&path, b"second").unwrap_err();
         assert_eq!(error.error.kind(), io::ErrorKind::AlreadyExists);
         assert_eq!(fs::read(&path).unwrap(), b"first");
-        assert_eq!(entries(dir.path()).unwrap(), [path.clone()]);
+        assert_eq!(entries(dir.path()).unwrap(), std::slice::from_ref(&path));
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt as _;

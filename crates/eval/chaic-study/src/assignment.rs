@@ -62,7 +62,7 @@ fn latin_square(n: usize) -> Vec<Vec<usize>> {
     let first: Vec<usize> = first.collect();
     let row = |shift: usize| first.iter().map(|c| (c + shift) % n).collect::<Vec<usize>>();
     let square: Vec<Vec<usize>> = (0..n).map(row).collect();
-    if n % 2 == 0 || n == 1 {
+    if n.is_multiple_of(2) || n == 1 {
         return square;
     }
     let mirrored = square.iter().map(|row| row.iter().rev().copied().collect());
@@ -77,7 +77,7 @@ mod tests {
     fn latin_squares_balance_positions_and_neighbors() {
         for n in 1..=16 {
             let square = latin_square(n);
-            let n_rows = if n % 2 == 0 || n == 1 { n } else { 2 * n };
+            let n_rows = if n.is_multiple_of(2) || n == 1 { n } else { 2 * n };
             assert_eq!(square.len(), n_rows);
             let mut positions = vec![vec![0; n]; n];
             let mut neighbors = vec![vec![0; n]; n];

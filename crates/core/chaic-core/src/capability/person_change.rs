@@ -68,7 +68,7 @@ impl PersonChange {
     /// Returns the capability with the changed walking speed, or `None` if the speed stays.
     pub fn with_speed(self, capability: Capability) -> Option<Capability> {
         let factor = f32::from(self.speed_percent) / 100.0;
-        (self.speed_percent != 100).then(|| Capability {
+        (self.speed_percent != 100).then_some(Capability {
             speed_m_per_frame: factor * capability.speed_m_per_frame,
             approach_speed_m_per_frame: factor * capability.approach_speed_m_per_frame,
             ..capability

@@ -55,7 +55,7 @@ pub struct Target {
     /// Parses an input; the error is the message for the user.
     pub parse: fn(&Inputs, &[u8]) -> Result<(), String>,
     /// Repairs lengths and digests of a changed input, so that the parser reads on.
-    pub repair: fn(&mut Vec<u8>),
+    pub repair: fn(&mut [u8]),
 }
 
 /// All parsers.
@@ -158,7 +158,7 @@ fn weights(_: &Inputs, bytes: &[u8]) -> Result<(), String> {
 }
 
 /// Writes the length of the header of a safetensors file, which is the text up to the last brace.
-fn repair_weights(bytes: &mut Vec<u8>) {
+fn repair_weights(bytes: &mut [u8]) {
     let end = bytes.windows(2).rposition(|pair| pair == b"}}");
     if let Some(len) = end.and_then(|at| (at + 2).checked_sub(8)) {
         bytes[..8].copy_from_slice(&(len as u64).to_le_bytes());
@@ -170,7 +170,7 @@ fn checkpoint(_: &Inputs, bytes: &[u8]) -> Result<(), String> {
     Checkpoint::from_bytes(bytes, &identity).map(drop).map_err(message)
 }
 
-fn repair_checkpoint(bytes: &mut Vec<u8>) {
+fn repair_checkpoint(bytes: &mut [u8]) {
     if let Some((head, body)) = bytes.split_at_checked(CHECKPOINT_HEAD + 16) {
         let content = [&head[..CHECKPOINT_HEAD], body].concat();
         let digest = xxh3_128(&content).to_le_bytes();
@@ -285,7 +285,7 @@ fn responses() -> Vec<Vec<u8>> {
 }
 
 /// Writes the lengths of a single message.
-fn repair_frame(bytes: &mut Vec<u8>) {
+fn repair_frame(bytes: &mut [u8]) {
     let Some(first) = bytes.get(..8) else { return };
     let length =
         |k: usize| u32::from_le_bytes([first[k], first[k + 1], first[k + 2], first[k + 3]]);

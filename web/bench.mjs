@@ -1,14 +1,13 @@
 // Speed of a page in Chromium: node bench.mjs FILE.html, for a page of `chaic view` or `chaic play`.
 
 import { resolve } from "node:path";
-import { chromium } from "playwright-core";
+import { launch } from "./test-kit.mjs";
 
 const SEEKS = 40;
 const PLAY_SECONDS = 3;
 const GAME_SECONDS = 20;
 
-const executablePath = process.env.CHROMIUM ?? "/usr/bin/chromium";
-const browser = await chromium.launch({ executablePath, args: ["--no-sandbox"] });
+const browser = await launch();
 const page = await browser.newPage({ viewport: { width: 1280, height: 900 } });
 
 /** Plays the first game as the helper, always by the first plan; the world never waits long. */

@@ -7,16 +7,12 @@
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
-import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { deflateRawSync, inflateRawSync } from "node:zlib";
-import { chromium } from "playwright-core";
+import { chaic, findings, launch, playTo, scrollWidth } from "./test-kit.mjs";
 
-const chaic = process.env.CHAIC ?? "chaic";
-const executablePath = process.env.CHROMIUM ?? "/usr/bin/chromium";
-const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const folder = mkdtempSync(join(tmpdir(), "chaic-study-"));
 const definition = join(folder, "study.toml");
 const file = join(folder, "study.html");
@@ -51,7 +47,7 @@ before(async () => {
   }
   writeFileSync(definition, STUDY);
   execFileSync(chaic, ["study", "build", definition, "--out", file]);
-  browser = await chromium.launch({ executablePath, args: ["--no-sandbox"] });
+  browser = await launch();
 });
 
 after(async () => {
@@ -91,21 +87,6 @@ async function tabTo(page, wanted, key = "Enter") {
 }
 
 const heading = (page, text) => page.getByRole("heading", { level: 1, name: text }).waitFor();
-
-/** Selects the first plan until a frame. */
-async function play(page, frame) {
-  await page.waitForFunction(
-    (until) => {
-      const play = document.querySelector("chaic-play");
-      if (play?.shown?.status === "waiting") {
-        play.shadowRoot.querySelector("section").dispatchEvent(new KeyboardEvent("keydown", { key: "1" }));
-      }
-      return play?.shown?.frame >= until;
-    },
-    frame,
-    { timeout: 60_000, polling: 30 },
-  );
-}
 
 /** Presses the key of the first plan until a frame. */
 async function playByKeys(page, frame) {
@@ -193,7 +174,7 @@ test("a reload loses nothing and goes on at the checkpoint", async () => {
   await page.getByRole("button", { name: "I agree" }).click();
   await page.getByRole("button", { name: "Continue" }).click();
   await page.getByRole("button", { name: "Start the episode" }).click();
-  await play(page, 90);
+  await playTo(page, 90);
   const before = await records(page);
   assert.ok(before.filter((record) => record.type === "trace").length > 1, "decisions are saved while playing");
   await page.reload();
@@ -223,7 +204,7 @@ test("stopping deletes all data, also in an episode", async () => {
   await page.getByRole("button", { name: "I agree" }).click();
   await page.getByRole("button", { name: "Continue" }).click();
   await page.getByRole("button", { name: "Start the episode" }).click();
-  await play(page, 30);
+  await playTo(page, 30);
   await page.getByRole("button", { name: "Stop and delete" }).click();
   await page.getByRole("button", { name: "Go on with the study" }).click();
   await page.getByRole("button", { name: "Stop and delete" }).click();
@@ -278,7 +259,7 @@ test("one switch suffices from the consent to the first form", async () => {
     await take("^Start the episode");
     await page.waitForFunction(() => document.querySelector("chaic-play")?.shown?.status === "waiting");
     await take("^(?!Stop|Continue)\\w");
-    await play(page, 90);
+    await playTo(page, 90);
     await take("^Continue");
   }
   await heading(page, "Workload");
@@ -296,11 +277,8 @@ test("axe finds nothing, and nothing is wider than the page", async () => {
   ]) {
     const { page, context } = await open("#5", options);
     const check = async (name) => {
-      await page.evaluate(axe);
-      const { violations } = await page.evaluate(() => window.axe.run());
-      const found = violations.map((v) => `${name}: ${v.id}: ${v.nodes.map((n) => n.html).join(" ")}`);
-      assert.deepEqual(found, [], JSON.stringify(options));
-      const width = await page.evaluate(() => document.documentElement.scrollWidth);
+      assert.deepEqual(await findings(page), [], `${name} ${JSON.stringify(options)}`);
+      const width = await scrollWidth(page);
       assert.ok(width <= options.viewport.width, `${name}: ${width} in ${JSON.stringify(options)}`);
       if (process.env.SCREENSHOTS) {
         const { width } = options.viewport;
@@ -316,7 +294,7 @@ test("axe finds nothing, and nothing is wider than the page", async () => {
       await heading(page, new RegExp(`^Episode ${k} of 3`));
       if (k === 1) await check("trial");
       await press("Start the episode");
-      await play(page, 20);
+      await playTo(page, 20);
       if (k === 2) await check("play");
       await press("Stop here");
       await press("Continue");

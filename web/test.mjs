@@ -9,16 +9,12 @@ import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { createHash } from "node:crypto";
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
-import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { deflateRawSync, inflateRawSync } from "node:zlib";
-import { chromium } from "playwright-core";
+import { chaic, findings, launch, playTo, scrollWidth } from "./test-kit.mjs";
 
-const chaic = process.env.CHAIC ?? "chaic";
-const executablePath = process.env.CHROMIUM ?? "/usr/bin/chromium";
-const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const folder = mkdtempSync(join(tmpdir(), "chaic-web-"));
 const run = join(folder, "run");
 const view = join(folder, "view.html");
@@ -30,7 +26,7 @@ before(async () => {
   const episodes = ["--task", "low_target", "--n-episodes", "1", "--helper", "none,infer"];
   execFileSync(chaic, ["eval", "-q", ...episodes, "--size", "128", "--out", run]);
   execFileSync(chaic, ["view", run, "--out", view]);
-  browser = await chromium.launch({ executablePath, args: ["--no-sandbox"] });
+  browser = await launch();
 });
 
 after(async () => {
@@ -223,21 +219,6 @@ test("a comparison shows both runs, and where they diverge", async () => {
   await page.close();
 });
 
-/** Selects the first plan by its key until a frame. */
-async function playTo(page, frame) {
-  await page.waitForFunction(
-    (until) => {
-      const play = document.querySelector("chaic-play");
-      if (play?.shown?.status === "waiting") {
-        play.shadowRoot.querySelector("section").dispatchEvent(new KeyboardEvent("keydown", { key: "1" }));
-      }
-      return play?.shown?.frame >= until;
-    },
-    frame,
-    { timeout: 60_000, polling: 30 },
-  );
-}
-
 /** Stops the game, downloads its trace and verifies it on the command line. */
 async function verified(page, name) {
   await page.getByRole("button", { name: "Stop here" }).click();
@@ -262,9 +243,7 @@ test("a game played by keyboard verifies on the command line, and can be watched
   await playTo(page, 150);
   const text = await page.locator("chaic-play header").innerText();
   assert.match(text, /wants something that you do not know/);
-  await page.evaluate(axe);
-  const { violations } = await page.evaluate(() => window.axe.run());
-  assert.deepEqual(violations.map((v) => `${v.id}: ${v.nodes.map((n) => n.html).join(" ")}`), []);
+  assert.deepEqual(await findings(page), []);
   const trace = await verified(page, "game.jsonl");
   assert.match(trace, /"helper":"human"/);
   await page.getByRole("button", { name: "Watch the replay" }).click();
@@ -355,11 +334,8 @@ test("axe finds nothing, and nothing is wider than the page", async () => {
     ]) {
       const { page } = await open(file, hash, options);
       await shown(page);
-      await page.evaluate(axe);
-      const { violations } = await page.evaluate(() => window.axe.run());
-      const found = violations.map((v) => `${v.id}: ${v.nodes.map((n) => n.html).join(" ")}`);
-      assert.deepEqual(found, [], JSON.stringify(options));
-      const width = await page.evaluate(() => document.documentElement.scrollWidth);
+      assert.deepEqual(await findings(page), [], JSON.stringify(options));
+      const width = await scrollWidth(page);
       assert.ok(width <= options.viewport.width, `${width} in ${JSON.stringify(options)}`);
       await page.close();
     }

@@ -16,7 +16,7 @@ use clap::Args;
 
 use crate::commands::{Ended, FileOperation, run};
 use crate::folder::{contents, copy, differences};
-use crate::scenario::{prepare, select, words};
+use crate::scenario::{select, words};
 use crate::trial::Trial;
 
 /// Options of `faults`.
@@ -47,9 +47,7 @@ pub fn run_all(options: &FaultOptions) -> Result<bool> {
     for scenario in select(&options.scenarios)? {
         let began = Instant::now();
         let dir = tempfile::tempdir().context("no temporary folder")?;
-        let inputs = dir.path().join("inputs");
-        std::fs::create_dir(&inputs)?;
-        prepare(scenario.steps, &inputs).with_context(|| format!("scenario {}", scenario.name))?;
+        let inputs = scenario.prepare_inputs(dir.path())?;
         let trial = Trial::new(scenario, &inputs, dir.path())?;
         let cases = cases(&trial.operations, kinds, options.every as usize);
         let failures = run_cases(&trial, &cases, dir.path(), options.jobs as usize)?;

@@ -13,7 +13,7 @@ use clap::Args;
 
 use crate::commands::chaic;
 use crate::folder::copy;
-use crate::scenario::{prepare, select, words};
+use crate::scenario::{select, words};
 use crate::trial::Trial;
 
 /// Most kills of one command and its ways back.
@@ -43,9 +43,7 @@ pub fn run_all(options: &KillOptions) -> Result<bool> {
     for scenario in select(&options.scenarios)? {
         let began = Instant::now();
         let dir = tempfile::tempdir().context("no temporary folder")?;
-        let inputs = dir.path().join("inputs");
-        std::fs::create_dir(&inputs)?;
-        prepare(scenario.steps, &inputs).with_context(|| format!("scenario {}", scenario.name))?;
+        let inputs = scenario.prepare_inputs(dir.path())?;
         let trial = Trial::new(scenario, &inputs, dir.path())?;
         let duration = duration(&trial, &dir.path().join("timed"))?;
         let (mut n_kills, mut n_commands, mut failures) = (0, 0, 0);

@@ -1,7 +1,7 @@
 //! Commands that write files, with their inputs and the way back after an interruption.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 
@@ -200,6 +200,19 @@ pub const SCENARIOS: [Scenario; 10] = [
 /// Configuration of a fast training.
 const TRAINING: &str = "warm_up = 1\nbatch_size = 1\nvalidation_max_per_class = 5\n\
                         windows = \"w\"\n[collect]\nepisodes = 1\nimage_size = 32\n";
+
+impl Scenario {
+    /// Prepares the inputs in a new folder below `folder`, and returns it.
+    ///
+    /// # Errors
+    /// If a step fails.
+    pub fn prepare_inputs(&self, folder: &Path) -> Result<PathBuf> {
+        let inputs = folder.join("inputs");
+        fs::create_dir(&inputs)?;
+        prepare(self.steps, &inputs).with_context(|| format!("scenario {}", self.name))?;
+        Ok(inputs)
+    }
+}
 
 /// Prepares inputs in an empty folder.
 ///

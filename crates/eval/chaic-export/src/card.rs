@@ -13,11 +13,11 @@ pub struct DatasetDescription {
     pub title: String,
     /// One or two sentences about the content.
     pub summary: String,
-    /// How the data came about.
+    /// Origin of the data.
     pub collection: String,
     /// Uses that the data is meant for.
     pub uses: &'static [&'static str],
-    /// What the data does not cover.
+    /// Gaps of the data.
     pub limitations: &'static [&'static str],
     /// Ways in which the data differs from the world.
     pub biases: &'static [&'static str],
@@ -62,7 +62,7 @@ pub struct Field {
     pub name: &'static str,
     /// Type of the value, or of the elements of a list.
     pub data_type: DataType,
-    /// Whether the value is a list.
+    /// True if the value is a list.
     pub is_list: bool,
     /// Meaning, with unit and range.
     pub description: String,

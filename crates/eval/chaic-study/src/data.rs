@@ -81,7 +81,7 @@ pub enum DataRecord {
     TrialEnd {
         /// Number of the trial.
         trial: usize,
-        /// How it ended.
+        /// Reason of the end.
         outcome: TrialEnd,
     },
     /// A form is answered.

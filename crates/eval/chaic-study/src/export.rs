@@ -116,7 +116,7 @@ fn data_error(path: &Path, line: usize, problem: String) -> StudyError {
     StudyError::Data { path: path.to_owned(), line, problem }
 }
 
-/// What one participant did, checked against the plan.
+/// Records of one participant, checked against the plan.
 struct Participation {
     path: PathBuf,
     code: String,

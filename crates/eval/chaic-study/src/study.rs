@@ -90,7 +90,7 @@ pub enum WorldPace {
     GoesOn,
 }
 
-/// How episodes are played, unless a factor differs.
+/// Settings of all episodes, unless a factor differs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlaySettings {
@@ -222,7 +222,7 @@ pub struct Study {
     pub episodes: Vec<String>,
     /// Number of episodes of each condition.
     pub trials: u32,
-    /// How episodes are played, unless a factor differs.
+    /// Settings of all episodes, unless a factor differs.
     pub play: PlaySettings,
     /// Names of the forms.
     pub forms: FormPlan,

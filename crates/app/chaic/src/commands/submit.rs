@@ -1,6 +1,5 @@
 //! `chaic submit`.
 
-use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -14,7 +13,7 @@ use chaic_arena::{
 use chaic_core::FRAMES_PER_SECOND;
 use chaic_env::helper_registry::{HelperRegistry, NONE};
 use chaic_eval::report::{rounded, write_files};
-use chaic_eval::run::{FolderMode, Run, RunFolder, RunRequest};
+use chaic_eval::run::{FolderMode, Run, RunFolder, RunProgress, RunRequest};
 use chaic_files::write_atomically;
 use chaic_page::write_report;
 use chaic_sandbox::Launcher;
@@ -244,7 +243,7 @@ fn play_run(
     let report = report_of(&run);
     write_files(run.folder(), &report)?;
     write_report(run.folder(), &report)?;
-    let RunCounts { total, errors } = RunCounts::of(&run);
+    let RunProgress { total, errors, .. } = run.progress();
     let json = json!({ "run": path, "episode_runs": total, "failed": errors });
     let failed = if errors > 0 { format!("; failed, zero each: {errors}") } else { String::new() };
     let text = format!(
@@ -255,19 +254,6 @@ fn play_run(
     );
     print_result(format, &json, &text)?;
     Ok(ExitStatus::from_findings(errors > 0))
-}
-
-/// Numbers of episode runs of a complete run.
-struct RunCounts {
-    total: usize,
-    errors: usize,
-}
-
-impl RunCounts {
-    fn of(run: &Run) -> RunCounts {
-        let extent = run.progress();
-        RunCounts { total: extent.total, errors: extent.errors }
-    }
 }
 
 fn score(arguments: &SubmitScoreArguments, format: OutputFormat) -> Result<ExitStatus> {
@@ -343,18 +329,12 @@ pub(super) fn verify_evaluation(
     jobs: usize,
 ) -> Result<EvaluationReport> {
     let path = evaluation.run_folder();
-    let n_traces = traces_of(&path)?;
-    let (_, options) = RunFolder::read(&path)?;
+    let (folder, options) = RunFolder::read(&path)?;
+    let n_traces = folder.traces()?.len();
     let helpers = RecordedHelpers::new(&path, &options)?;
     let bar = bars::count_bar(n_traces as u64, "traces");
     let progress = |done: usize| bar.set_position(done as u64);
     let report = evaluation.verify(&helpers.registry(), commitment, jobs, &progress);
     bar.finish_and_clear();
     Ok(report?)
-}
-
-/// Returns the number of traces of a run.
-fn traces_of(run: &Path) -> Result<usize> {
-    let (folder, _) = RunFolder::read(run)?;
-    Ok(folder.traces()?.len())
 }

@@ -1,4 +1,4 @@
-//! Makes a folder of policies by task from trainings of primitive policies: `cargo run --release -p
+//! Makes a folder of policies by task from trainings of visual policies: `cargo run --release -p
 //! chaic-learn --example bundle_by_task -- TRAININGS OUT`.
 //!
 //! Reads `TRAININGS/TASK/policy.safetensors` of the eight tasks and writes `OUT/TASK.safetensors`,
@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 use chaic_core::TaskId;
 use chaic_learn::actor_critic::ActorCritic as _;
-use chaic_learn::primitive::network::PrimitiveNetwork;
+use chaic_learn::visual::network::VisualNetwork;
 use chaic_nn::weights::{kind, to_bf16};
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -22,8 +22,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         let path = trainings.join(task.name()).join("policy.safetensors");
         let bytes = std::fs::read(&path).map_err(|e| format!("{}: {e}", path.display()))?;
         let kind = kind(&bytes)?;
-        let model = PrimitiveNetwork::from_kind(&kind)
-            .ok_or_else(|| format!("{}: no primitive policy", path.display()))?;
+        let model = VisualNetwork::from_kind(&kind)
+            .ok_or_else(|| format!("{}: no visual policy", path.display()))?;
         let rounded = to_bf16(model.network(), &bytes, &kind)?;
         std::fs::write(out.join(format!("{task}.safetensors")), rounded)?;
     }

@@ -8,7 +8,7 @@ use chaic_core::TaskId;
 use chaic_core::observation::Grants;
 
 use crate::loaded_policy::LoadedPolicy;
-use crate::primitive::helper::{PrimitivePolicies, PrimitiveWeights};
+use crate::visual::helper::{VisualPolicies, VisualWeights};
 
 /// Table entry of a helper with bundled weights.
 pub struct BundledHelper {
@@ -35,7 +35,7 @@ macro_rules! policy {
     };
 }
 
-/// Policies of primitive actions, one per task, from a folder.
+/// Visual policies, one per task, from a folder.
 macro_rules! policies_by_task {
     ($folder:literal) => {
         LazyLock::new(|| {
@@ -55,10 +55,10 @@ macro_rules! policies_by_task {
 
 fn load_by_task(files: [(TaskId, &[u8]); 8]) -> LoadedPolicy {
     let policies = files.map(|(task, bytes)| {
-        (task, PrimitiveWeights::from_bytes(bytes).expect("bundled weights are valid"))
+        (task, VisualWeights::from_bytes(bytes).expect("bundled weights are valid"))
     });
-    let policies = PrimitivePolicies::by_task(policies).expect("their inputs are the same");
-    LoadedPolicy::Actions(Arc::new(policies))
+    let policies = VisualPolicies::by_task(policies).expect("their inputs are the same");
+    LoadedPolicy::Visual(Arc::new(policies))
 }
 
 /// All bundled helpers.

@@ -14,7 +14,7 @@ use chaic_nn::weights::WeightsError;
 
 use crate::bundled::BundledHelper;
 use crate::loaded_policy::LoadedPolicy;
-use crate::primitive::helper::{PrimitivePolicies, PrimitiveWeights};
+use crate::visual::helper::{VisualPolicies, VisualWeights};
 
 /// Maximum size of a weights file, bytes.
 const MAX_BYTES: u64 = 1 << 28;
@@ -53,7 +53,7 @@ impl From<PolicyError> for EnvError {
 }
 
 impl NamedPolicy {
-    /// Reads a policy from a weights file, or policies of primitive actions from a folder with one
+    /// Reads a policy from a weights file, or visual policies from a folder with one
     /// file per task, `TASK.safetensors`.
     ///
     /// # Errors
@@ -61,7 +61,7 @@ impl NamedPolicy {
     pub fn read(name: &str, path: &Path) -> chaic_env::Result<NamedPolicy> {
         let is_folder = fs::metadata(path).is_ok_and(|metadata| metadata.is_dir());
         let policy = if is_folder {
-            LoadedPolicy::Actions(Arc::new(read_folder(path)?))
+            LoadedPolicy::Visual(Arc::new(read_folder(path)?))
         } else {
             let bytes = read_user_file(path, MAX_BYTES).map_err(PolicyError::from)?;
             let weights_error = |problem| PolicyError::Weights { path: path.to_owned(), problem };
@@ -71,8 +71,8 @@ impl NamedPolicy {
     }
 }
 
-/// Reads one policy of primitive actions per task.
-fn read_folder(folder: &Path) -> Result<PrimitivePolicies, PolicyError> {
+/// Reads one visual policy per task.
+fn read_folder(folder: &Path) -> Result<VisualPolicies, PolicyError> {
     let path_of = |task: TaskId| folder.join(format!("{task}.{EXTENSION}"));
     let mut policies = Vec::new();
     for task in TaskId::all() {
@@ -81,13 +81,13 @@ fn read_folder(folder: &Path) -> Result<PrimitivePolicies, PolicyError> {
             continue;
         }
         let bytes = read_user_file(&path, MAX_BYTES)?;
-        let weights = PrimitiveWeights::from_bytes(&bytes);
+        let weights = VisualWeights::from_bytes(&bytes);
         policies.push((task, weights.map_err(|problem| PolicyError::Weights { path, problem })?));
     }
     if policies.is_empty() {
         return Err(PolicyError::EmptyFolder { path: folder.to_owned() });
     }
-    PrimitivePolicies::by_task(policies)
+    VisualPolicies::by_task(policies)
         .map_err(|task| PolicyError::OtherInputs { path: path_of(task) })
 }
 

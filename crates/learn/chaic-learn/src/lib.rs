@@ -1,11 +1,11 @@
-//! Helpers that learn to choose plans or primitive actions, and their trainings.
+//! Helpers that learn to choose plans or actions, and their trainings.
 //!
 //! **What it is**: [`actor_critic`] is the interface of policy networks, [`candidate_scorer`] a
 //! network for any number of candidates, [`ppo`] proximal policy optimization. [`features`] encodes
 //! a decision between plans; predictions of the [`opponent`] model may extend it. [`policy`] lets a
 //! network drive an agent, [`policy_kind`] lists networks by their inputs, and [`rollout`] plays
 //! episodes. [`cloning`] learns from an expert whose choices [`demonstrations`] keeps, and [`train`]
-//! has the trainers. [`primitive`] has policies of primitive actions from images.
+//! has the trainers. [`visual`] has policies that read images.
 //! [`helpers`] makes either a helper of a run, and [`bundled`] lists those that are part of chaic.
 //! [`toy`] has tasks with a known best return, which
 //! test the learner.
@@ -37,7 +37,7 @@ pub mod rollout;
 pub mod rollout_config;
 pub mod train;
 
-pub mod primitive;
+pub mod visual;
 
 pub mod bundled;
 pub mod helpers;

@@ -9,25 +9,23 @@ use chaic_nn::weights::{self, WeightsError};
 
 use crate::policy::{ActionSelection, LearnedPolicy, policy_helper};
 use crate::policy_kind::PolicyWeights;
-use crate::primitive::helper::{PrimitiveHelper, PrimitivePolicies, PrimitiveWeights};
-use crate::primitive::network::PrimitiveNetwork;
+use crate::visual::helper::{VisualHelper, VisualPolicies, VisualWeights};
+use crate::visual::network::VisualNetwork;
 
 /// Policy from one or more weights files.
 pub(crate) enum LoadedPolicy {
-    /// Policy that chooses plans.
+    /// Policy that chooses among the valid plans.
     Plans(Arc<PolicyWeights>),
-    /// Policies that choose primitive actions.
-    Actions(Arc<PrimitivePolicies>),
+    /// Policies that read images.
+    Visual(Arc<VisualPolicies>),
 }
 
 impl LoadedPolicy {
     /// Parses the weights of a policy for all tasks.
     pub(crate) fn from_bytes(bytes: &[u8]) -> Result<LoadedPolicy, WeightsError> {
-        if PrimitiveNetwork::from_kind(&weights::kind(bytes)?).is_some() {
-            let weights = PrimitiveWeights::from_bytes(bytes)?;
-            return Ok(LoadedPolicy::Actions(Arc::new(PrimitivePolicies::AllTasks(Arc::new(
-                weights,
-            )))));
+        if VisualNetwork::from_kind(&weights::kind(bytes)?).is_some() {
+            let weights = VisualWeights::from_bytes(bytes)?;
+            return Ok(LoadedPolicy::Visual(Arc::new(VisualPolicies::AllTasks(Arc::new(weights)))));
         }
         Ok(LoadedPolicy::Plans(Arc::new(PolicyWeights::from_bytes(bytes)?)))
     }
@@ -39,8 +37,8 @@ impl LoadedPolicy {
                 let policy = LearnedPolicy::new(Arc::clone(weights), ActionSelection::HELPER, None);
                 policy_helper(policy, rules, perception, weights.grants())
             }
-            LoadedPolicy::Actions(policies) => {
-                PrimitiveHelper::create(Arc::clone(policies), rules, perception)
+            LoadedPolicy::Visual(policies) => {
+                VisualHelper::create(Arc::clone(policies), rules, perception)
             }
         }
     }

@@ -51,7 +51,7 @@ impl From<CumulativeTable> for RewardWeights {
     }
 }
 
-/// `[rewards]`: weights of a reward per action, for policies of primitive actions.
+/// `[rewards]`: weights of a reward per action, for visual policies.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ActionTable {

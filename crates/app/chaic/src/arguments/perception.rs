@@ -19,8 +19,9 @@ pub enum TrainCommand {
     Ppo(TrainArguments),
     /// Train the same policy by behavior cloning of an expert.
     Clone(TrainArguments),
-    /// Train a policy of single actions from images, as in the paper.
-    Primitive(TrainArguments),
+    /// Train a policy that reads images, as in the paper.
+    #[command(alias = "primitive")]
+    Visual(TrainArguments),
     /// Train the opponent model, which infers the partner's goal and limits.
     Opponent(TrainArguments),
 }

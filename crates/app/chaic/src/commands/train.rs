@@ -9,8 +9,8 @@ use anyhow::Result;
 use chaic_eval::curves::{Curve, draw};
 use chaic_files::read_bounded;
 use chaic_learn::opponent::train::OpponentTrainer;
-use chaic_learn::primitive::train::PrimitiveTrainer;
 use chaic_learn::train::{CloningConfig, PolicyTrainer, PpoTrainingConfig};
+use chaic_learn::visual::train::VisualTrainer;
 use chaic_training::{CURVES, CurveRecord, Phase, Trainer, TrainingRun, read_config_with};
 use chaic_vision::behavior::train::BehaviorTrainer;
 use chaic_vision::train::DetectorLearner;
@@ -54,9 +54,9 @@ pub fn run(command: &TrainCommand, format: OutputFormat) -> Result<ExitStatus> {
                 config.iterations = n;
             })
         }
-        TrainCommand::Primitive(arguments) => {
-            let names = CommandNames::for_policy("primitive");
-            train::<PrimitiveTrainer>(&names, arguments, format, |config, n| config.n_updates = n)
+        TrainCommand::Visual(arguments) => {
+            let names = CommandNames::for_policy("visual");
+            train::<VisualTrainer>(&names, arguments, format, |config, n| config.n_updates = n)
         }
     }
 }

@@ -13,7 +13,7 @@ use {
     std::time::{Duration, Instant},
 };
 
-const TRAININGS: [&str; 6] = ["detector", "behavior", "ppo", "clone", "primitive", "opponent"];
+const TRAININGS: [&str; 6] = ["detector", "behavior", "ppo", "clone", "visual", "opponent"];
 /// Longest time until a training ends after a signal. On an idle machine it is 5 s.
 #[cfg(unix)]
 const SOON: Duration = Duration::from_secs(20);
@@ -48,7 +48,7 @@ fn configurations_out_of_bounds_are_refused_by_key() {
         ("ppo", "[rollout]\nvalidation_episodes = 4294967296", "from 1 to 1000"),
         ("clone", "learning_rate = nan", "`learning_rate` is nan"),
         ("detector", "shards = 9223372036854775807", "an integer from 1 to 256"),
-        ("primitive", "n_envs = 4294967296", "`n_envs` is 4294967296"),
+        ("visual", "n_envs = 4294967296", "`n_envs` is 4294967296"),
     ] {
         fs::write(at.join("c.toml"), config).expect("it is written");
         let out = output_of(at, &["train", training, "--config", "c.toml", "--out", "o"]);

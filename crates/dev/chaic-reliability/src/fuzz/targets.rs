@@ -16,8 +16,8 @@ use chaic_learn::opponent::collect::read_from_user_path;
 use chaic_learn::opponent::network::OpponentModel;
 use chaic_learn::opponent::train::OpponentTrainer;
 use chaic_learn::policy_kind::PolicyWeights;
-use chaic_learn::primitive::train::PrimitiveTrainer;
 use chaic_learn::train::{CloningConfig, PolicyTrainer, PpoTrainingConfig};
+use chaic_learn::visual::train::VisualTrainer;
 use chaic_llm::endpoint::Client;
 use chaic_llm::exchange::Reply;
 use chaic_llm::key::Key;
@@ -183,7 +183,7 @@ fn training_config(_: &Inputs, bytes: &[u8]) -> Result<(), String> {
     let parsed = [
         parse_config::<PolicyTrainer<PpoTrainingConfig>>(config).map(drop),
         parse_config::<PolicyTrainer<CloningConfig>>(config).map(drop),
-        parse_config::<PrimitiveTrainer>(config).map(drop),
+        parse_config::<VisualTrainer>(config).map(drop),
         parse_config::<OpponentTrainer>(config).map(drop),
         parse_config::<DetectorLearner>(config).map(drop),
         parse_config::<BehaviorTrainer>(config).map(drop),
@@ -203,7 +203,7 @@ fn training_configs() -> Vec<Vec<u8>> {
     vec![
         text::<PolicyTrainer<PpoTrainingConfig>>(),
         text::<PolicyTrainer<CloningConfig>>(),
-        text::<PrimitiveTrainer>(),
+        text::<VisualTrainer>(),
         text::<OpponentTrainer>(),
         text::<DetectorLearner>(),
         text::<BehaviorTrainer>(),

@@ -2,8 +2,8 @@
 //! besides its current one, and an unknown key, are refused with one clear message.
 
 use chaic_learn::opponent::train::OpponentTrainer;
-use chaic_learn::primitive::train::PrimitiveTrainer;
 use chaic_learn::train::{CloningConfig, PolicyTrainer, PpoTrainingConfig};
+use chaic_learn::visual::train::VisualTrainer;
 use chaic_training::conformance::check_renamed_keys;
 use chaic_training::parse_config;
 
@@ -50,11 +50,11 @@ fn old_keys_are_read_and_conflicting_and_unknown_keys_are_refused() {
             ("rate", "learning_rate", "0.5"),
         ],
     );
-    check_renamed_keys::<PrimitiveTrainer>(
+    check_renamed_keys::<VisualTrainer>(
         "",
         &[("updates", "n_updates", "7"), ("envs", "n_envs", "2"), ("rollout", "n_steps", "5")],
     );
-    check_renamed_keys::<PrimitiveTrainer>(
+    check_renamed_keys::<VisualTrainer>(
         "[rewards]\ndelivered = 10.0\ninvalid = 0.1\n",
         &[("approached_per_m", "progress_per_m", "0.5")],
     );

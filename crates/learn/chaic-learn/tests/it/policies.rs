@@ -19,8 +19,9 @@ use chaic_learn::bundled::BundledHelper;
 use chaic_learn::helpers::{NamedPolicy, PolicyRegistry};
 use chaic_learn::opponent::network::OpponentInput;
 use chaic_learn::opponent::train::OpponentTrainer;
-use chaic_learn::primitive::network::PrimitiveNetwork;
 use chaic_learn::train::{CloningConfig, PolicyTrainer, PpoTrainingConfig};
+use chaic_learn::visual::actions::ActionSpace;
+use chaic_learn::visual::network::VisualNetwork;
 use chaic_nn::weights;
 use chaic_training::parse_config;
 
@@ -28,9 +29,9 @@ fn bundled() -> PolicyRegistry<'static> {
     PolicyRegistry::bundled(&BuiltInHelpers, Arc::new(GroundTruthPerceptionFactory))
 }
 
-/// Writes random weights of a policy of primitive actions.
-fn write_primitive_policy(file: &Path, opponent: OpponentInput, seed: u64) {
-    let model = PrimitiveNetwork::new(opponent);
+/// Writes random weights of a visual policy.
+fn write_visual_policy(file: &Path, opponent: OpponentInput, seed: u64) {
+    let model = VisualNetwork::new(ActionSpace::Primitives, opponent);
     let parameters = model.network().init_parameters(seed);
     let bytes = weights::to_bytes(model.network(), &parameters, &model.kind()).unwrap();
     fs::write(file, bytes).unwrap();
@@ -114,7 +115,7 @@ fn bundled_helpers_learn_no_secret() {
 fn the_name_of_a_bundled_helper_is_taken() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("policy.safetensors");
-    write_primitive_policy(&file, OpponentInput::None, 1);
+    write_visual_policy(&file, OpponentInput::None, 1);
     let name = BundledHelper::all()[0].name;
     let policy = NamedPolicy::read(name, &file).unwrap();
     let refused = bundled().with_policies(vec![policy]).err().unwrap().to_string();
@@ -132,7 +133,7 @@ fn a_folder_of_weights_is_a_policy_per_task() {
     let tasks = [TaskId::MovingHouse, TaskId::Shopping];
     let files = tasks.map(|task| folder.path().join(format!("{task}.safetensors")));
     for (seed, file) in (1..).zip(&files) {
-        write_primitive_policy(file, OpponentInput::None, seed);
+        write_visual_policy(file, OpponentInput::None, seed);
     }
     assert!(make(folder.path()).grants.task, "the task selects the policy");
     assert!(!make(&files[0]).grants.task);
@@ -145,10 +146,10 @@ fn a_folder_of_weights_is_a_policy_per_task() {
     let problem = play(make(folder.path()), TaskId::LowTarget).unwrap_err().to_string();
     assert!(problem.contains("grant the task"), "{problem}");
     let digest = make(folder.path()).agent.weights();
-    write_primitive_policy(&files[1], OpponentInput::None, 3);
+    write_visual_policy(&files[1], OpponentInput::None, 3);
     assert_ne!(make(folder.path()).agent.weights(), digest, "every file counts");
     // Policies with other inputs, and a folder without weights.
-    write_primitive_policy(&files[1], OpponentInput::Seen, 2);
+    write_visual_policy(&files[1], OpponentInput::Seen, 2);
     let problem = NamedPolicy::read("mine", folder.path()).err().unwrap().to_string();
     assert!(problem.contains("other inputs"), "{problem}");
     let empty = tempfile::tempdir().unwrap();

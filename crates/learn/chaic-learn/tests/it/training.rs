@@ -19,9 +19,10 @@ use chaic_learn::opponent::network::OpponentInput;
 use chaic_learn::policy::ActionSelection;
 use chaic_learn::policy_kind::{PolicyKind, PolicyWeights};
 use chaic_learn::ppo::PpoConfig;
-use chaic_learn::primitive::train::{PrimitiveConfig, PrimitiveTrainer};
 use chaic_learn::rollout::{RolloutContext, RolloutEpisode, rollout};
 use chaic_learn::train::{CloningConfig, PolicyTrainer, PpoTrainingConfig, RolloutConfig};
+use chaic_learn::visual::actions::ActionSpace;
+use chaic_learn::visual::train::{VisualConfig, VisualTrainer};
 use chaic_nn::weights;
 use chaic_training::conformance::{bounds_every_number, refuses_damaged_checkpoints};
 use chaic_training::run::checkpoint_bytes;
@@ -167,7 +168,7 @@ fn damaged_checkpoints_and_values_out_of_bounds_are_refused() {
         rollout: small_rollout(),
         ..CloningConfig::default()
     });
-    check::<PrimitiveTrainer>(&PrimitiveConfig { n_envs: 2, ..PrimitiveConfig::default() });
+    check::<VisualTrainer>(&VisualConfig { n_envs: 2, ..VisualConfig::default() });
 }
 
 #[test]
@@ -176,7 +177,7 @@ fn configurations_that_exceed_memory_are_refused_by_key() {
         ("n_envs = 1024\nimage_size = 512", ["n_envs", "image_size"]),
         ("n_envs = 1024\nn_steps = 1024", ["n_envs", "n_steps"]),
     ] {
-        let problem = parse_config::<PrimitiveTrainer>(text).unwrap_err();
+        let problem = parse_config::<VisualTrainer>(text).unwrap_err();
         assert!(names.iter().all(|name| problem.contains(name)), "{problem}");
     }
 }
@@ -226,19 +227,24 @@ fn stopped_steps_change_nothing() {
         rollout: small_rollout(),
         ..CloningConfig::default()
     });
-    check::<PrimitiveTrainer>(&primitive());
+    check::<VisualTrainer>(&visual(ActionSpace::Primitives));
 }
 
 /// Returns a configuration in which updates end within episodes and episodes within updates.
-fn primitive() -> PrimitiveConfig {
-    PrimitiveConfig {
+fn visual(action_space: ActionSpace) -> VisualConfig {
+    VisualConfig {
+        action_space,
         n_updates: 2,
         n_envs: 2,
-        n_steps: 150,
+        n_steps: match action_space {
+            ActionSpace::Plans => 40,
+            ActionSpace::Primitives => 150,
+        },
+        image_size: 128,
         tasks: vec![TaskId::MovingHouse],
         validation_episodes: 1,
         ppo: PpoConfig { batch_size: 50, n_epochs: 1, shards: 2, ..PpoConfig::default() },
-        ..PrimitiveConfig::default()
+        ..VisualConfig::default()
     }
 }
 
@@ -253,20 +259,26 @@ fn write_opponent(file: &Path) -> Vec<f32> {
 }
 
 #[test]
-fn interrupted_primitive_trainings_end_with_the_same_bits() {
+fn interrupted_visual_trainings_end_with_the_same_bits() {
+    for action_space in ActionSpace::ALL {
+        check_interrupted_visual_training(action_space);
+    }
+}
+
+fn check_interrupted_visual_training(action_space: ActionSpace) {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("opponent.safetensors");
     write_opponent(&file);
-    let config = PrimitiveConfig { opponent: Some(file), ..primitive() };
+    let config = VisualConfig { opponent: Some(file), ..visual(action_space) };
     let checkpoints = [false, true].map(|is_paused| {
         let out = folder.path().join(format!("{is_paused}"));
         let mut quiet = |_: &str| ();
         let started =
-            TrainingRun::<PrimitiveTrainer>::start(&out, &config, None, &mut quiet, &NEVER_STOP);
+            TrainingRun::<VisualTrainer>::start(&out, &config, None, &mut quiet, &NEVER_STOP);
         let mut run = started.unwrap().unwrap();
         if is_paused {
             drop(run);
-            let trainer = PrimitiveTrainer::new(&config, &out, &mut quiet, &NEVER_STOP);
+            let trainer = VisualTrainer::new(&config, &out, &mut quiet, &NEVER_STOP);
             let mut trainer = trainer.unwrap().unwrap();
             let metrics = trainer.step(&NEVER_STOP).unwrap().unwrap();
             let bytes = checkpoint_bytes(&trainer, &[metrics]).unwrap();
@@ -278,7 +290,7 @@ fn interrupted_primitive_trainings_end_with_the_same_bits() {
         fs::read(out.join(CHECKPOINT)).unwrap()
     });
     assert!(checkpoints[0] == checkpoints[1]);
-    let weights = folder.path().join("true").join(PrimitiveTrainer::WEIGHTS);
+    let weights = folder.path().join("true").join(VisualTrainer::WEIGHTS);
     let policy = NamedPolicy::read("mine", &weights).unwrap();
     let helpers = PolicyRegistry::bundled(&BuiltInHelpers, Arc::new(GroundTruthPerceptionFactory))
         .with_policies(vec![policy])

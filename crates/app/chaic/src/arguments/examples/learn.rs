@@ -109,14 +109,14 @@ pub(super) const EXAMPLES: &[CommandExamples] = &[
         ],
     ),
     (
-        "chaic train primitive",
+        "chaic train visual",
         [
-            ("Train with the default configuration", "chaic train primitive --out runs/primitive"),
+            ("Train with the default configuration", "chaic train visual --out runs/visual"),
             (
                 "Train for another task",
-                "chaic train primitive --set 'tasks=[\"obstacle\"]' --out runs/obstacle",
+                "chaic train visual --set 'tasks=[\"obstacle\"]' --out runs/obstacle",
             ),
-            ("Continue a training", "chaic train primitive --resume --out runs/primitive"),
+            ("Continue a training", "chaic train visual --resume --out runs/visual"),
         ],
     ),
     (

@@ -1,4 +1,4 @@
-//! Configuration of the training of primitive actions.
+//! Configuration of the training of visual policies.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -11,16 +11,19 @@ use chaic_episodes::SeedRange;
 use chaic_vision::perception_registry::{self, PerceptionError};
 use serde::{Deserialize, Serialize};
 
+use super::actions::ActionSpace;
 use crate::ppo::PpoConfig;
 use crate::reward_config;
 use crate::rollout_config::GENERATORS;
 
-/// Configuration of `chaic train primitive`.
+/// Configuration of `chaic train visual`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct PrimitiveConfig {
+pub struct VisualConfig {
     /// Seed of weights, episodes and batches.
     pub seed: u64,
+    /// Meaning of the policy's outputs.
+    pub action_space: ActionSpace,
     /// Total number of updates.
     #[serde(alias = "updates")]
     pub n_updates: u64,
@@ -52,20 +55,21 @@ pub struct PrimitiveConfig {
     pub ppo: PpoConfig,
 }
 
-impl Default for PrimitiveConfig {
+impl Default for VisualConfig {
     /// Defaults of the paper: 10^4 decisions, an update after every two, minibatches of two,
     /// otherwise as in Stable-Baselines3.
-    fn default() -> PrimitiveConfig {
+    fn default() -> VisualConfig {
         let defaults = PpoConfig::default();
-        PrimitiveConfig {
+        VisualConfig {
             seed: 1,
+            action_space: ActionSpace::Plans,
             n_updates: 5000,
             n_envs: 1,
             n_steps: 2,
             tasks: vec![TaskId::NoConstraint],
             splits: vec![GENERATORS[0].to_owned()],
             opponent: None,
-            image_size: 128,
+            image_size: 256,
             perception: GROUND_TRUTH.to_owned(),
             behavior: GROUND_TRUTH.to_owned(),
             validation_episodes: 4,
@@ -75,7 +79,7 @@ impl Default for PrimitiveConfig {
     }
 }
 
-impl PrimitiveConfig {
+impl VisualConfig {
     pub(super) fn perception_factory(&self) -> Result<Arc<dyn PerceptionFactory>, PerceptionError> {
         perception_registry::perception_from_name(&self.perception, &self.behavior)
     }

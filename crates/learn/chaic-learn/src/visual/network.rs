@@ -6,25 +6,31 @@ use std::ops::Range;
 use chaic_nn::simd::widest;
 use chaic_nn::{Kernel, Network, Node, Pass, Shape, Tensor};
 
-use super::ACTIONS;
+use super::actions::ActionSpace;
 use super::observation::{
-    IMAGE_CHANNELS, IMAGE_SIZE, MAP, MAP_CHANNELS, N_OPPONENT, N_STATE, PrimitiveObservation,
+    IMAGE_CHANNELS, IMAGE_SIZE, MAP, MAP_CHANNELS, N_OPPONENT, N_STATE, VisualObservation,
 };
 use crate::actor_critic::{ActorCritic, ActorCriticOutput, OutputGrad, log_softmax};
 use crate::opponent::network::{self as opponent_network, OPPONENT, OpponentInput, OpponentModel};
 
 /// Network architecture without parameter values.
 #[derive(Clone, Debug)]
-pub struct PrimitiveNetwork {
+pub struct VisualNetwork {
     network: Network,
     logits: Node,
     value: Node,
+    /// Meaning of the outputs.
+    action_space: ActionSpace,
     opponent: OpponentInput,
 }
 
 /// Returns the kind in weights files.
-fn kind(opponent: OpponentInput) -> String {
-    format!("chaic primitive policy 2{}", opponent.kind_suffix())
+fn kind(action_space: ActionSpace, opponent: OpponentInput) -> String {
+    let name = match action_space {
+        ActionSpace::Plans => "chaic visual plan policy 1",
+        ActionSpace::Primitives => "chaic primitive policy 2",
+    };
+    format!("{name}{}", opponent.kind_suffix())
 }
 
 /// Size of the image patches that become one pixel of the first map, as in vision transformers
@@ -40,9 +46,9 @@ const N_FEATURES: usize = 64;
 /// Width of the shared layers (paper, appendix on learning).
 const N_SHARED: usize = 64;
 
-impl PrimitiveNetwork {
+impl VisualNetwork {
     /// Creates the network. Its parameters include those of the opponent model.
-    pub fn new(opponent: OpponentInput) -> PrimitiveNetwork {
+    pub fn new(action_space: ActionSpace, opponent: OpponentInput) -> VisualNetwork {
         let mut net = Network::default();
         let image = net.input(PATCH_SIZE * PATCH_SIZE * IMAGE_CHANNELS);
         let map = net.auxiliary_input(MAP_CHANNELS, PATCHES_PER_SIDE / MAP.side);
@@ -73,23 +79,30 @@ impl PrimitiveNetwork {
         for k in 0..2 {
             shared = layer(&mut net, &format!("shared{k}"), shared, Kernel::POINTWISE, N_SHARED);
         }
-        let logits = net.output_head("actor", shared, ACTIONS.len());
+        let logits = net.output_head("actor", shared, action_space.head_sizes().iter().sum());
         let value = net.output_head("critic", shared, 1);
         if has_opponent {
             net.extra_parameters(OPPONENT, opponent_network::network().network.n_parameters());
         }
-        PrimitiveNetwork { network: net, logits, value, opponent }
+        VisualNetwork { network: net, logits, value, action_space, opponent }
     }
 
     /// Kind in weights files.
     pub fn kind(&self) -> String {
-        kind(self.opponent)
+        kind(self.action_space, self.opponent)
+    }
+
+    /// Meaning of the outputs.
+    pub fn action_space(&self) -> ActionSpace {
+        self.action_space
     }
 
     /// Returns the network of this kind in weights files, if there is one.
-    pub fn from_kind(name: &str) -> Option<PrimitiveNetwork> {
-        let input = OpponentInput::ALL.into_iter().find(|input| kind(*input) == name);
-        input.map(PrimitiveNetwork::new)
+    pub fn from_kind(name: &str) -> Option<VisualNetwork> {
+        let kinds =
+            ActionSpace::ALL.into_iter().flat_map(|space| OpponentInput::ALL.map(|o| (space, o)));
+        let found = kinds.into_iter().find(|(space, opponent)| kind(*space, *opponent) == name);
+        found.map(|(space, opponent)| VisualNetwork::new(space, opponent))
     }
 
     /// Returns the range of the opponent model's parameters, if there is one.
@@ -102,6 +115,36 @@ impl PrimitiveNetwork {
     pub(crate) fn opponent(&self, parameters: &[f32]) -> Option<OpponentModel> {
         let parameters = parameters[self.opponent_range()?].to_vec();
         Some(OpponentModel::new(parameters, self.opponent == OpponentInput::Granted))
+    }
+}
+
+/// Returns the log-probabilities of all combinations of independent choices, the last choice varying
+/// fastest, given the logits of each.
+fn joint_log_probs(logits: &[f32], head_sizes: &[usize]) -> Vec<f32> {
+    let mut joint = vec![0.0];
+    let mut remaining = logits;
+    for size in head_sizes {
+        let (head, rest) = remaining.split_at(*size);
+        let log_probs = log_softmax(head);
+        joint = joint.iter().flat_map(|a| log_probs.iter().map(move |b| a + b)).collect();
+        remaining = rest;
+    }
+    joint
+}
+
+/// Adds up gradients with respect to joint logits to those with respect to the logits of each
+/// independent choice: the reverse of [`joint_log_probs`].
+fn sum_by_head(joint: &[f32], head_sizes: &[usize], sums: &mut [f32]) {
+    let mut first = 0;
+    let mut n_later: usize = head_sizes.iter().product();
+    for size in head_sizes {
+        n_later /= size;
+        let head = &mut sums[first..first + size];
+        head.fill(0.0);
+        for (k, grad) in joint.iter().enumerate() {
+            head[k / n_later % size] += grad;
+        }
+        first += size;
     }
 }
 
@@ -123,15 +166,15 @@ fn write_patches(image: &[u8], patches: &mut [f32]) {
     }
 }
 
-impl PrimitiveNetwork {
+impl VisualNetwork {
     /// Creates the buffers of a pass.
     pub fn pass(&self) -> Pass {
         Pass::new(&self.network, widest())
     }
 }
 
-impl ActorCritic for PrimitiveNetwork {
-    type Observation = PrimitiveObservation;
+impl ActorCritic for VisualNetwork {
+    type Observation = VisualObservation;
 
     fn network(&self) -> &Network {
         &self.network
@@ -140,7 +183,7 @@ impl ActorCritic for PrimitiveNetwork {
     fn forward<'a>(
         &self,
         parameters: &[f32],
-        observations: impl Iterator<Item = &'a PrimitiveObservation> + Clone,
+        observations: impl Iterator<Item = &'a VisualObservation> + Clone,
         pass: &mut Pass,
     ) -> Vec<ActorCriticOutput> {
         let n = observations.clone().count();
@@ -152,17 +195,15 @@ impl ActorCritic for PrimitiveNetwork {
         });
         let images = image.data.chunks_exact_mut(image.shape.len_per_item());
         observations.clone().zip(images).for_each(|(s, to)| write_patches(&s.image, to));
-        let tensor = |size: usize,
-                      channels: usize,
-                      bytes: fn(&PrimitiveObservation) -> &[u8],
-                      scale: f32| {
-            let shape = Shape { n, height: size, width: size, channels };
-            let mut data = Vec::with_capacity(n * shape.len_per_item());
-            for observation in observations.clone() {
-                data.extend(bytes(observation).iter().map(|byte| scale * f32::from(*byte)));
-            }
-            Tensor { shape, data }
-        };
+        let tensor =
+            |size: usize, channels: usize, bytes: fn(&VisualObservation) -> &[u8], scale: f32| {
+                let shape = Shape { n, height: size, width: size, channels };
+                let mut data = Vec::with_capacity(n * shape.len_per_item());
+                for observation in observations.clone() {
+                    data.extend(bytes(observation).iter().map(|byte| scale * f32::from(*byte)));
+                }
+                Tensor { shape, data }
+            };
         let map = tensor(MAP.side, MAP_CHANNELS, |s| &s.map, 1.0);
         let state = tensor(1, N_STATE, |s| &s.state, 1.0 / 255.0);
         if self.opponent == OpponentInput::None {
@@ -171,11 +212,12 @@ impl ActorCritic for PrimitiveNetwork {
             let opponent = tensor(1, N_OPPONENT, |s| &s.opponent, 1.0 / 255.0);
             pass.forward_all(&self.network, parameters, &[&image, &map, &state, &opponent]);
         }
-        let logits = pass.activation(self.logits).data.chunks_exact(ACTIONS.len());
+        let head_sizes = self.action_space.head_sizes();
+        let logits = pass.activation(self.logits).data.chunks_exact(head_sizes.iter().sum());
         let outputs = logits.zip(&pass.activation(self.value).data);
         outputs
             .map(|(logits, value)| ActorCriticOutput {
-                log_probs: log_softmax(logits),
+                log_probs: joint_log_probs(logits, &head_sizes),
                 values: vec![*value],
             })
             .collect()
@@ -189,11 +231,30 @@ impl ActorCritic for PrimitiveNetwork {
         grad_parameters: &mut [f32],
     ) {
         pass.zero_gradients();
+        let head_sizes = self.action_space.head_sizes();
+        let n: usize = head_sizes.iter().sum();
         for (k, grad) in grad_outputs.iter().enumerate() {
             pass.gradient(self.value).data[k] = grad.values[0];
-            let to = &mut pass.gradient(self.logits).data[k * ACTIONS.len()..][..ACTIONS.len()];
-            to.copy_from_slice(&grad.logits);
+            let to = &mut pass.gradient(self.logits).data[k * n..][..n];
+            sum_by_head(&grad.logits, &head_sizes, to);
         }
         pass.backward(&self.network, parameters, grad_parameters);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn independent_choices_have_joint_probabilities_and_separate_gradients() {
+        let joint = joint_log_probs(&[0.0, 1.0, 2.0, 0.5, -0.5], &[3, 2]);
+        let [a, b] = [log_softmax(&[0.0, 1.0, 2.0]), log_softmax(&[0.5, -0.5])];
+        for (k, log_prob) in joint.iter().enumerate() {
+            assert!((log_prob - a[k / 2] - b[k % 2]).abs() < 1e-6, "{k}");
+        }
+        let mut sums = [9.0; 5];
+        sum_by_head(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0], &[3, 2], &mut sums);
+        assert_eq!(sums, [3.0, 7.0, 11.0, 9.0, 12.0]);
     }
 }

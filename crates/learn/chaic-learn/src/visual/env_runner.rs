@@ -1,4 +1,4 @@
-//! Environments in which a policy of primitive actions collects experience.
+//! Environments in which a visual policy collects experience.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -8,16 +8,18 @@ use chaic_core::AgentId;
 use chaic_core::observation::SensorConfig;
 use chaic_core::rng::RngStream;
 use chaic_env::rules::RuleSet;
-use chaic_env::{AdvanceOutcome, AgentSlot, Env, EpisodeAgents, EpisodeConfig, RewardWeights};
+use chaic_env::{
+    AdvanceOutcome, AgentSlot, Env, EpisodeAgents, EpisodeConfig, RewardTerms, RewardWeights,
+};
 use chaic_episodes::find_episode;
 use chaic_nn::Pass;
 use rayon::prelude::*;
 
-use super::PAUSE;
-use super::config::PrimitiveConfig;
-use super::helper::ObservationEncoder;
-use super::network::PrimitiveNetwork;
-use super::observation::PrimitiveObservation;
+use super::actions::ActionSpace;
+use super::config::VisualConfig;
+use super::helper::{BegunAction, ObservationEncoder};
+use super::network::VisualNetwork;
+use super::observation::VisualObservation;
 use crate::actor_critic::{ActorCritic as _, ActorCriticOutput};
 use crate::opponent::network::OpponentModel;
 use crate::ppo::{Trajectory, Transition};
@@ -25,10 +27,10 @@ use crate::rollout::RolloutError;
 
 /// Configuration, perception and network of a training, which all environments share.
 pub(super) struct TrainingSetup {
-    pub config: PrimitiveConfig,
+    pub config: VisualConfig,
     pub perception: Arc<dyn PerceptionFactory>,
     pub opponent: Option<Arc<OpponentModel>>,
-    pub model: PrimitiveNetwork,
+    pub model: VisualNetwork,
 }
 
 /// Environment with the learning helper, which plays one episode after another.
@@ -38,13 +40,13 @@ pub(super) struct EnvRunner {
     env: Env,
     encoder: ObservationEncoder,
     /// Actions chosen in the current episode.
-    actions: Vec<u8>,
+    actions: Vec<u16>,
     /// Current observation.
-    observation: PrimitiveObservation,
+    observation: VisualObservation,
     pass: Pass,
 }
 
-/// Outcome of an action.
+/// Outcome of a decision.
 struct StepOutcome {
     reward: f32,
     is_invalid: bool,
@@ -72,31 +74,52 @@ impl EnvRunner {
         let mut env = Env::new(config, agents)?;
         encoder.reset(&env.briefing(AgentId::HELPER));
         env.advance(None)?;
-        let observation = env.observe(AgentId::HELPER).and_then(|o| encoder.encode(o));
+        let observation = env.observe(AgentId::HELPER).and_then(|observation| {
+            encoder.observe(observation);
+            // No plan has begun: the agent lists the valid ones.
+            encoder.continue_plan(setup.model.action_space());
+            encoder.encode(observation)
+        });
         let observation = observation.expect("the helper decides before an episode ends");
         Ok(EnvRunner { slot, n_started, env, encoder, actions: Vec::new(), observation, pass })
     }
 
-    /// Takes an action and advances to the next decision or the end. After the end the observation
-    /// is outdated.
+    /// Takes a decision and advances to the next one or the end. After the end the observation is
+    /// outdated.
     fn act(
         &mut self,
         action_index: usize,
+        action_space: ActionSpace,
         rewards: &RewardWeights,
     ) -> Result<StepOutcome, RolloutError> {
-        self.actions.push(action_index as u8);
-        let action = self.encoder.action(action_index);
-        self.env.submit(AgentId::HELPER, action.unwrap_or(PAUSE));
-        let has_ended = self.env.advance(None)? == AdvanceOutcome::Ended;
-        let terms = self.env.reward(AgentId::HELPER);
-        let is_invalid = action.is_none() || terms.is_some_and(|t| t.is_invalid);
-        let terms = terms.map(|t| chaic_env::RewardTerms { is_invalid, ..t });
-        if !has_ended && let Some(observation) = self.env.observe(AgentId::HELPER) {
-            self.observation =
-                self.encoder.encode(observation).unwrap_or_else(|| self.observation.clone());
+        self.actions.push(action_index as u16);
+        let BegunAction { mut action, is_invalid } = self.encoder.begin(action_space, action_index);
+        let mut outcome = StepOutcome { reward: 0.0, is_invalid, has_ended: false };
+        let mut is_first = true;
+        loop {
+            self.env.submit(AgentId::HELPER, action);
+            outcome.has_ended = self.env.advance(None)? == AdvanceOutcome::Ended;
+            if let Some(terms) = self.env.reward(AgentId::HELPER) {
+                let is_invalid = terms.is_invalid || is_first && is_invalid;
+                outcome.is_invalid |= is_invalid;
+                outcome.reward += RewardTerms { is_invalid, ..terms }.weigh(rewards) as f32;
+            }
+            is_first = false;
+            if outcome.has_ended {
+                return Ok(outcome);
+            }
+            let Some(observation) = self.env.observe(AgentId::HELPER) else { return Ok(outcome) };
+            self.encoder.observe(observation);
+            match self.encoder.continue_plan(action_space) {
+                Some(next) => action = next,
+                None => {
+                    if let Some(encoded) = self.encoder.encode(observation) {
+                        self.observation = encoded;
+                    }
+                    return Ok(outcome);
+                }
+            }
         }
-        let reward = terms.map_or(0.0, |t| t.weigh(rewards)) as f32;
-        Ok(StepOutcome { reward, is_invalid, has_ended })
     }
 
     /// Progress of the current episode.
@@ -124,7 +147,7 @@ impl EnvRunner {
             let output = self.evaluate(model, parameters);
             let action_index = output.sample(rng.unit());
             let observation = self.observation.clone();
-            let outcome = self.act(action_index, &config.rewards)?;
+            let outcome = self.act(action_index, config.action_space, &config.rewards)?;
             experience.reward += f64::from(outcome.reward);
             experience.n_invalid += usize::from(outcome.is_invalid);
             trajectory.transitions.push(Transition {
@@ -149,7 +172,7 @@ impl EnvRunner {
         Ok(Some(experience))
     }
 
-    fn evaluate(&mut self, model: &PrimitiveNetwork, parameters: &[f32]) -> ActorCriticOutput {
+    fn evaluate(&mut self, model: &VisualNetwork, parameters: &[f32]) -> ActorCriticOutput {
         model.forward(parameters, std::iter::once(&self.observation), &mut self.pass).remove(0)
     }
 }
@@ -157,7 +180,7 @@ impl EnvRunner {
 /// Experience of one environment between two updates.
 #[derive(Default)]
 pub(super) struct Experience {
-    pub trajectories: Vec<Trajectory<PrimitiveObservation>>,
+    pub trajectories: Vec<Trajectory<VisualObservation>>,
     pub reward: f64,
     pub n_invalid: usize,
 }
@@ -166,7 +189,7 @@ pub(super) struct Experience {
 #[derive(Clone, Debug, Default)]
 pub(super) struct EpisodeProgress {
     pub n_started: u64,
-    pub actions: Vec<u8>,
+    pub actions: Vec<u16>,
 }
 
 /// Replays the current episodes up to this progress; `None` if it was stopped.
@@ -191,7 +214,8 @@ pub(super) fn replay(
                 return Ok(None);
             }
             let outcome =
-                runner.act(usize::from(*action_index), &config.rewards).map_err(failed)?;
+                runner.act(usize::from(*action_index), config.action_space, &config.rewards);
+            let outcome = outcome.map_err(failed)?;
             if outcome.has_ended {
                 return Err("continues after the end of an episode".to_owned());
             }

@@ -1,4 +1,4 @@
-//! Input of policies of primitive actions: color and depth, the memory as a map, and the agent's
+//! Input of visual policies: color and depth, the memory as a map, and the agent's
 //! state.
 
 use chaic_agents::PlanningAgent;
@@ -46,7 +46,7 @@ const N_HELD: usize = 10;
 
 /// Observation, stored as bytes to save memory.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PrimitiveObservation {
+pub struct VisualObservation {
     /// Color, and depth with 0 to 255 for 0 to 10 m; shape [128, 128, 4].
     pub image: Vec<u8>,
     /// Map, 0 or 1; shape [32, 32, 8].
@@ -70,7 +70,7 @@ pub fn opponent_features(prediction: &OpponentPrediction, nearest_target: f32) -
 /// Depth that is encoded as 1, meters.
 const MAX_DEPTH_M: f32 = 10.0;
 
-impl PrimitiveObservation {
+impl VisualObservation {
     /// Creates the observation of an agent that has already processed `observation`; `opponent` are
     /// the features of its opponent model, if it has one.
     pub fn new(
@@ -78,7 +78,7 @@ impl PrimitiveObservation {
         agent: &PlanningAgent<ExternalPolicy>,
         briefing: &Briefing,
         opponent: Vec<u8>,
-    ) -> PrimitiveObservation {
+    ) -> VisualObservation {
         let mut map = vec![0; MAP.len()];
         if let Some(memory) = agent.memory() {
             let mut planes = vec![0; MAP.len()];
@@ -88,7 +88,7 @@ impl PrimitiveObservation {
                 to.iter_mut().enumerate().for_each(|(c, to)| *to = planes[c * n + pixel]);
             }
         }
-        PrimitiveObservation {
+        VisualObservation {
             image: image(observation),
             map,
             state: state(observation, agent, briefing),

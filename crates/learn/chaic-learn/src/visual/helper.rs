@@ -1,4 +1,4 @@
-//! Agent that takes primitive actions by a network.
+//! Agent that acts by a visual policy.
 
 use std::sync::Arc;
 
@@ -13,18 +13,20 @@ use chaic_env::helper_registry::Helper;
 use chaic_nn::Pass;
 use chaic_nn::weights::{self, WeightsError};
 
-use super::network::PrimitiveNetwork;
-use super::observation::{PrimitiveObservation, opponent_features};
-use super::{ACTIONS, PAUSE, resolve_action, visible_objects};
+use super::actions::{
+    ActionSpace, PAUSE, PlanChoice, resolve_plan, resolve_primitive, visible_objects,
+};
+use super::network::VisualNetwork;
+use super::observation::{VisualObservation, opponent_features};
 use crate::actor_critic::ActorCritic as _;
 use crate::opponent::network::{OpponentInput, OpponentModel};
 use crate::opponent::tracker::OpponentTracker;
 
 /// Network with parameter values.
 #[derive(Clone, Debug)]
-pub struct PrimitiveWeights {
+pub struct VisualWeights {
     /// Network architecture.
-    pub model: PrimitiveNetwork,
+    pub model: VisualNetwork,
     /// Parameters, with those of the opponent model.
     pub parameters: Vec<f32>,
     /// Opponent model whose predictions are inputs, if the network has such inputs.
@@ -33,68 +35,69 @@ pub struct PrimitiveWeights {
     pub digest: Option<String>,
 }
 
-impl PrimitiveWeights {
+impl VisualWeights {
     /// Combines a network with parameters, which include those of its opponent model.
-    pub fn new(model: &PrimitiveNetwork, parameters: Vec<f32>) -> PrimitiveWeights {
+    pub fn new(model: &VisualNetwork, parameters: Vec<f32>) -> VisualWeights {
         let opponent = model.opponent(&parameters).map(Arc::new);
-        PrimitiveWeights { model: model.clone(), parameters, opponent, digest: None }
+        VisualWeights { model: model.clone(), parameters, opponent, digest: None }
     }
 
     /// Parses a weights file.
     ///
     /// # Errors
     /// [`WeightsError`] if the file is incomplete or belongs to another network.
-    pub fn from_bytes(bytes: &[u8]) -> Result<PrimitiveWeights, WeightsError> {
+    pub fn from_bytes(bytes: &[u8]) -> Result<VisualWeights, WeightsError> {
         let kind = weights::kind(bytes)?;
-        let model = PrimitiveNetwork::from_kind(&kind);
-        let model = model.unwrap_or_else(|| PrimitiveNetwork::new(OpponentInput::None));
+        let model = VisualNetwork::from_kind(&kind);
+        let model =
+            model.unwrap_or_else(|| VisualNetwork::new(ActionSpace::Plans, OpponentInput::None));
         let parameters = weights::from_bytes(model.network(), bytes, &model.kind())?;
         let digest = Some(weights::digest(bytes));
-        Ok(PrimitiveWeights { digest, ..PrimitiveWeights::new(&model, parameters) })
+        Ok(VisualWeights { digest, ..VisualWeights::new(&model, parameters) })
     }
 }
 
-/// Policies of primitive actions that play as one helper.
+/// Visual policies that play as one helper.
 #[derive(Clone, Debug)]
-pub enum PrimitivePolicies {
+pub enum VisualPolicies {
     /// One policy for all tasks.
-    AllTasks(Arc<PrimitiveWeights>),
+    AllTasks(Arc<VisualWeights>),
     /// One policy per task, all with the same inputs. The helper is granted the task, which selects
     /// its policy.
-    ByTask(Vec<(TaskId, Arc<PrimitiveWeights>)>),
+    ByTask(Vec<(TaskId, Arc<VisualWeights>)>),
 }
 
-impl PrimitivePolicies {
+impl VisualPolicies {
     /// Combines policies of single tasks.
     ///
     /// # Errors
     /// The first task whose policy has other inputs than that of the first one.
     pub fn by_task(
-        policies: impl IntoIterator<Item = (TaskId, PrimitiveWeights)>,
-    ) -> Result<PrimitivePolicies, TaskId> {
-        let policies: Vec<(TaskId, Arc<PrimitiveWeights>)> =
+        policies: impl IntoIterator<Item = (TaskId, VisualWeights)>,
+    ) -> Result<VisualPolicies, TaskId> {
+        let policies: Vec<(TaskId, Arc<VisualWeights>)> =
             policies.into_iter().map(|(task, weights)| (task, Arc::new(weights))).collect();
         let kinds = || policies.iter().map(|(task, weights)| (task, weights.model.kind()));
         match kinds().zip(kinds().skip(1)).find(|((_, before), (_, kind))| kind != before) {
             Some((_, (task, _))) => Err(*task),
-            None => Ok(PrimitivePolicies::ByTask(policies)),
+            None => Ok(VisualPolicies::ByTask(policies)),
         }
     }
 
     /// Returns the opponent model of one of the policies; all need the same grants.
     fn opponent(&self) -> Option<Arc<OpponentModel>> {
         let any = match self {
-            PrimitivePolicies::AllTasks(weights) => Some(weights),
-            PrimitivePolicies::ByTask(policies) => policies.first().map(|(_, weights)| weights),
+            VisualPolicies::AllTasks(weights) => Some(weights),
+            VisualPolicies::ByTask(policies) => policies.first().map(|(_, weights)| weights),
         };
         any.and_then(|weights| weights.opponent.clone())
     }
 
     /// Returns the policy for an episode of this task, which is unknown without the grant.
-    fn find(&self, task: Option<TaskId>) -> Option<&Arc<PrimitiveWeights>> {
+    fn find(&self, task: Option<TaskId>) -> Option<&Arc<VisualWeights>> {
         match self {
-            PrimitivePolicies::AllTasks(weights) => Some(weights),
-            PrimitivePolicies::ByTask(policies) => {
+            VisualPolicies::AllTasks(weights) => Some(weights),
+            VisualPolicies::ByTask(policies) => {
                 policies.iter().find(|(t, _)| Some(*t) == task).map(|(_, weights)| weights)
             }
         }
@@ -103,9 +106,9 @@ impl PrimitivePolicies {
     /// Digest of all weights files, if the policies are from files.
     fn digest(&self) -> Option<String> {
         match self {
-            PrimitivePolicies::AllTasks(weights) => weights.digest.clone(),
-            PrimitivePolicies::ByTask(policies) => {
-                let of_task = |(task, weights): &(TaskId, Arc<PrimitiveWeights>)| {
+            VisualPolicies::AllTasks(weights) => weights.digest.clone(),
+            VisualPolicies::ByTask(policies) => {
+                let of_task = |(task, weights): &(TaskId, Arc<VisualWeights>)| {
                     Some(format!("{task} {}", weights.digest.as_ref()?))
                 };
                 let digests: Option<Vec<String>> = policies.iter().map(of_task).collect();
@@ -160,13 +163,22 @@ impl ObservationEncoder {
         self.briefing = Some(briefing.clone());
     }
 
-    /// Processes an observation; returns the network's input.
-    pub(crate) fn encode(&mut self, observation: &Observation) -> Option<PrimitiveObservation> {
+    /// Processes an observation.
+    pub(crate) fn observe(&mut self, observation: &Observation) {
         self.agent.observe(observation);
+        let memory = self.agent.memory();
+        if let (Some(opponent), Some(memory), Some(briefing)) =
+            (&mut self.opponent, memory, &self.briefing)
+        {
+            opponent.observe(memory, briefing);
+        }
+    }
+
+    /// Returns the network's input, given the last observation; `None` before an episode.
+    pub(crate) fn encode(&self, observation: &Observation) -> Option<VisualObservation> {
         let briefing = self.briefing.as_ref()?;
-        let opponent = match (&mut self.opponent, self.agent.memory()) {
+        let opponent = match (&self.opponent, self.agent.memory()) {
             (Some(opponent), Some(memory)) => {
-                opponent.observe(memory, briefing);
                 let prediction = opponent.predict(memory, briefing, self.agent.behavior());
                 let nearest = visible_objects(memory, &briefing.possible_targets).next();
                 let target = nearest
@@ -175,46 +187,88 @@ impl ObservationEncoder {
             }
             _ => Vec::new(),
         };
-        Some(PrimitiveObservation::new(observation, &self.agent, briefing, opponent))
+        Some(VisualObservation::new(observation, &self.agent, briefing, opponent))
     }
 
-    /// Returns an action of [`ACTIONS`]; `None` if it cannot begin.
-    pub(crate) fn action(&self, action_index: usize) -> Option<Action> {
-        resolve_action(action_index, &self.agent, self.briefing.as_ref()?)
+    /// Returns the next action of the current plan; `None` if a decision is due.
+    pub(crate) fn continue_plan(&mut self, action_space: ActionSpace) -> Option<Action> {
+        match action_space {
+            // Without a plan, the agent lists the valid ones and halts.
+            ActionSpace::Plans => self.agent.next_action().ok(),
+            ActionSpace::Primitives => None,
+        }
+    }
+
+    /// Begins the chosen plan or action, when a decision is due. Without a valid plan of the chosen
+    /// kind the agent explores, as in the original; an action that cannot begin is a short wait.
+    pub(crate) fn begin(&mut self, action_space: ActionSpace, action_index: usize) -> BegunAction {
+        let action = match action_space {
+            ActionSpace::Primitives => {
+                let briefing = self.briefing.as_ref();
+                briefing.and_then(|it| resolve_primitive(action_index, &self.agent, it))
+            }
+            ActionSpace::Plans => match resolve_plan(action_index, self.agent.policy().valid()) {
+                PlanChoice::Wait => Some(PAUSE),
+                PlanChoice::Start(plan) => self.start_plan(plan),
+                PlanChoice::Invalid => {
+                    let action = self.start_plan(EXPLORE).unwrap_or(PAUSE);
+                    return BegunAction { action, is_invalid: true };
+                }
+            },
+        };
+        BegunAction { action: action.unwrap_or(PAUSE), is_invalid: action.is_none() }
+    }
+
+    /// Starts a valid plan; returns its first action, or `None` if it has none.
+    fn start_plan(&mut self, index: usize) -> Option<Action> {
+        self.agent.policy_mut().set_plan(index);
+        self.agent.next_action().ok()
     }
 }
 
-/// Helper that takes primitive actions by a network.
-pub struct PrimitiveHelper {
-    policies: Arc<PrimitivePolicies>,
+/// Index of the plan to explore, which always is the first valid one.
+const EXPLORE: usize = 0;
+
+/// First action of a decision.
+pub(crate) struct BegunAction {
+    pub(crate) action: Action,
+    /// True if the decision could not be carried out.
+    pub(crate) is_invalid: bool,
+}
+
+/// Helper that acts by a visual policy.
+pub struct VisualHelper {
+    policies: Arc<VisualPolicies>,
     encoder: ObservationEncoder,
     current: Option<CurrentPolicy>,
     rng: RngStream,
-    last_action: usize,
+    /// Description of the last decision.
+    last_decision: String,
 }
 
 /// Policy of the current episode.
 struct CurrentPolicy {
-    weights: Arc<PrimitiveWeights>,
+    weights: Arc<VisualWeights>,
     pass: Pass,
 }
 
-impl PrimitiveHelper {
+impl VisualHelper {
     /// Creates a helper with this perception and the grants that it needs.
     pub fn create(
-        policies: Arc<PrimitivePolicies>,
+        policies: Arc<VisualPolicies>,
         rules: PlannerRules,
         perception: &dyn PerceptionFactory,
     ) -> Helper {
         let (encoder, grants) = ObservationEncoder::new(rules, perception, policies.opponent());
-        let grants = Grants { task: matches!(*policies, PrimitivePolicies::ByTask(_)), ..grants };
-        let rng = RngStream::new(0, "primitive policy", 0);
-        let agent = PrimitiveHelper { policies, encoder, current: None, rng, last_action: 0 };
+        let grants = Grants { task: matches!(*policies, VisualPolicies::ByTask(_)), ..grants };
+        let rng = RngStream::new(0, "visual policy", 0);
+        let agent =
+            VisualHelper { policies, encoder, current: None, rng, last_decision: String::new() };
         Helper { agent: Box::new(agent), grants }
     }
 }
 
-impl Agent for PrimitiveHelper {
+impl Agent for VisualHelper {
     fn sensors(&self) -> SensorConfig {
         self.encoder.sensors()
     }
@@ -226,7 +280,7 @@ impl Agent for PrimitiveHelper {
             CurrentPolicy { weights: Arc::clone(weights), pass: weights.model.pass() }
         });
         self.encoder.reset(briefing);
-        self.rng = RngStream::new(briefing.seed, "primitive policy", 0);
+        self.rng = RngStream::new(briefing.seed, "visual policy", 0);
     }
 
     fn act(&mut self, observation: &Observation) -> Result<Action, AgentError> {
@@ -235,11 +289,16 @@ impl Agent for PrimitiveHelper {
                            that has a policy";
             return Err(AgentError::Broken(problem.to_owned()));
         };
+        let VisualWeights { model, parameters, .. } = &**weights;
+        self.encoder.observe(observation);
+        if let Some(action) = self.encoder.continue_plan(model.action_space()) {
+            return Ok(action);
+        }
         let Some(encoded) = self.encoder.encode(observation) else { return Ok(PAUSE) };
-        let PrimitiveWeights { model, parameters, .. } = &**weights;
         let output = model.forward(parameters, std::iter::once(&encoded), pass).remove(0);
-        self.last_action = output.sample(self.rng.unit());
-        Ok(self.encoder.action(self.last_action).unwrap_or(PAUSE))
+        let action_index = output.sample(self.rng.unit());
+        self.last_decision = model.action_space().name(action_index);
+        Ok(self.encoder.begin(model.action_space(), action_index).action)
     }
 
     fn perception(&self) -> Option<String> {
@@ -251,6 +310,6 @@ impl Agent for PrimitiveHelper {
     }
 
     fn thought(&self) -> Thought {
-        Thought { plan: ACTIONS[self.last_action].to_owned(), ..self.encoder.agent.thought() }
+        Thought { plan: self.last_decision.clone(), ..self.encoder.agent.thought() }
     }
 }

@@ -1,4 +1,4 @@
-//! Training of primitive actions by PPO, with the paper's hyperparameters by default.
+//! Training of visual policies by PPO, with the paper's hyperparameters by default.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -13,10 +13,9 @@ use chaic_training::{
 };
 use rayon::prelude::*;
 
-use super::ACTIONS;
 use super::env_runner::{EnvRunner, EpisodeProgress, Experience, TrainingSetup, replay};
-use super::helper::{PrimitiveHelper, PrimitivePolicies, PrimitiveWeights};
-use super::network::PrimitiveNetwork;
+use super::helper::{VisualHelper, VisualPolicies, VisualWeights};
+use super::network::VisualNetwork;
 use super::observation::IMAGE_SIZE;
 use crate::actor_critic::ActorCritic as _;
 use crate::opponent::network::OpponentInput;
@@ -26,10 +25,10 @@ use crate::rollout_config::{
     MAX_VALIDATION_EPISODES, REWARD, check_splits, read_opponent, validation_episodes,
 };
 
-pub use super::config::PrimitiveConfig;
+pub use super::config::VisualConfig;
 
-/// Trainer of a policy of primitive actions.
-pub struct PrimitiveTrainer {
+/// Trainer of a visual policy.
+pub struct VisualTrainer {
     setup: TrainingSetup,
     learner: Learner,
     updates: u64,
@@ -39,7 +38,7 @@ pub struct PrimitiveTrainer {
     interrupted_at: Option<Vec<EpisodeProgress>>,
 }
 
-impl PrimitiveTrainer {
+impl VisualTrainer {
     fn progress(&self) -> Vec<EpisodeProgress> {
         match &self.interrupted_at {
             Some(interrupted_at) => interrupted_at.clone(),
@@ -58,14 +57,14 @@ const MAX_CAMERA_PX: usize = 1 << 26;
 const MAX_BATCH: i64 = 512;
 
 /// Sections of a checkpoint.
-const UPDATES: &str = "primitive.updates";
-const EPISODES: &str = "primitive.episodes_begun";
-const N_ACTIONS: &str = "primitive.choices_of_each";
-const ACTION_INDICES: &str = "primitive.choices";
+const UPDATES: &str = "visual.updates";
+const EPISODES: &str = "visual.episodes_started";
+const N_ACTIONS: &str = "visual.n_actions";
+const ACTION_INDICES: &str = "visual.actions";
 
-impl Trainer for PrimitiveTrainer {
-    type Config = PrimitiveConfig;
-    const KIND: &'static str = "primitive";
+impl Trainer for VisualTrainer {
+    type Config = VisualConfig;
+    const KIND: &'static str = "visual";
     const WEIGHTS: &'static str = "policy.safetensors";
     const RECORD_STEPS: u64 = 50;
     const CHECKPOINT_STEPS: u64 = 500;
@@ -85,14 +84,15 @@ impl Trainer for PrimitiveTrainer {
     ];
 
     fn new(
-        config: &PrimitiveConfig,
+        config: &VisualConfig,
         _: &Path,
         _: &mut dyn FnMut(&str),
         stop: &AtomicBool,
-    ) -> Result<Option<PrimitiveTrainer>, TrainingError> {
+    ) -> Result<Option<VisualTrainer>, TrainingError> {
         let perception = config.perception_factory().map_err(TrainingError::from_data)?;
         let opponent = read_opponent(config.opponent.as_deref())?.map(Arc::new);
-        let model = PrimitiveNetwork::new(OpponentInput::from_model(opponent.as_deref()));
+        let model =
+            VisualNetwork::new(config.action_space, OpponentInput::from_model(opponent.as_deref()));
         let mut learner = Learner::new(model.network(), config.seed, config.ppo.shards);
         if let (Some(range), Some(opponent)) = (model.opponent_range(), &opponent) {
             learner.parameters[range].copy_from_slice(opponent.parameters());
@@ -102,13 +102,12 @@ impl Trainer for PrimitiveTrainer {
         let runners = replay(&setup, &progress, stop);
         let runners = runners.map_err(|e| TrainingError::InvalidConfig(format!("`tasks` {e}")))?;
         let Some(runners) = runners else { return Ok(None) };
-        let trainer =
-            PrimitiveTrainer { setup, learner, updates: 0, runners, interrupted_at: None };
+        let trainer = VisualTrainer { setup, learner, updates: 0, runners, interrupted_at: None };
         Ok(Some(trainer))
     }
 
-    fn check(config: &PrimitiveConfig) -> Result<(), String> {
-        let PrimitiveConfig { n_envs, n_steps, image_size, .. } = *config;
+    fn check(config: &VisualConfig) -> Result<(), String> {
+        let VisualConfig { n_envs, n_steps, image_size, .. } = *config;
         if config.tasks.is_empty() {
             return Err("`tasks` is empty".to_owned());
         }
@@ -131,9 +130,10 @@ impl Trainer for PrimitiveTrainer {
         config.perception_factory().map(|_| ()).map_err(|e| e.to_string())
     }
 
-    fn read_weights(config: &PrimitiveConfig, weights: &[u8]) -> Result<Vec<f32>, WeightsError> {
+    fn read_weights(config: &VisualConfig, weights: &[u8]) -> Result<Vec<f32>, WeightsError> {
         let opponent = read_opponent(config.opponent.as_deref()).ok().flatten();
-        let model = PrimitiveNetwork::new(OpponentInput::from_model(opponent.as_ref()));
+        let model =
+            VisualNetwork::new(config.action_space, OpponentInput::from_model(opponent.as_ref()));
         weights::from_bytes(model.network(), weights, &model.kind())
     }
 
@@ -157,8 +157,8 @@ impl Trainer for PrimitiveTrainer {
         checkpoint.insert_integers(EPISODES, progress.iter().map(|p| p.n_started).collect());
         checkpoint
             .insert_integers(N_ACTIONS, progress.iter().map(|p| p.actions.len() as u64).collect());
-        checkpoint
-            .insert_bytes(ACTION_INDICES, progress.into_iter().flat_map(|p| p.actions).collect());
+        let actions = progress.into_iter().flat_map(|p| p.actions);
+        checkpoint.insert_integers(ACTION_INDICES, actions.map(u64::from).collect());
         self.learner.save(&mut checkpoint);
         checkpoint
     }
@@ -204,20 +204,17 @@ impl Trainer for PrimitiveTrainer {
     }
 
     fn validate(&self, stop: &AtomicBool) -> Result<Option<(Metrics, Vec<u8>)>, WeightsError> {
-        let PrimitiveTrainer { setup, learner, .. } = self;
+        let VisualTrainer { setup, learner, .. } = self;
         let TrainingSetup { config, perception, model, .. } = setup;
         let parameters = learner.parameters.clone();
         let bytes = weights::to_bytes(model.network(), &parameters, &model.kind())?;
-        let weights = Arc::new(PrimitiveWeights::new(model, parameters));
-        let policies = Arc::new(PrimitivePolicies::AllTasks(weights));
+        let weights = Arc::new(VisualWeights::new(model, parameters));
+        let policies = Arc::new(VisualPolicies::AllTasks(weights));
         let episodes =
             validation_episodes(&config.tasks, &config.splits, config.validation_episodes);
         let rate = |episode: &RolloutEpisode| {
-            let helper = PrimitiveHelper::create(
-                Arc::clone(&policies),
-                RuleSet::PAPER.planner,
-                &**perception,
-            );
+            let helper =
+                VisualHelper::create(Arc::clone(&policies), RuleSet::PAPER.planner, &**perception);
             episode.play(helper, config.image_size, stop)
         };
         let rates: Result<Vec<Option<f64>>, RolloutError> = episodes.par_iter().map(rate).collect();
@@ -227,11 +224,11 @@ impl Trainer for PrimitiveTrainer {
     }
 }
 
-impl PrimitiveTrainer {
+impl VisualTrainer {
     /// Collects experience and updates the network. Returns `None` if it was stopped, with
     /// environments and learner in an unspecified state.
     fn update(&mut self, stop: &AtomicBool) -> Option<Metrics> {
-        let PrimitiveTrainer { setup, learner, updates, runners, .. } = self;
+        let VisualTrainer { setup, learner, updates, runners, .. } = self;
         let TrainingSetup { config, model, .. } = &*setup;
         let parameters = learner.parameters.clone();
         let collect = |runner: &mut EnvRunner| runner.collect(setup, &parameters, *updates, stop);
@@ -255,38 +252,28 @@ impl PrimitiveTrainer {
 
 /// Returns the progress of each environment, checked against the number of updates.
 fn read_progress(
-    config: &PrimitiveConfig,
+    config: &VisualConfig,
     updates: u64,
     checkpoint: &Checkpoint,
 ) -> Result<Vec<EpisodeProgress>, CheckpointError> {
     let episode_counts = checkpoint.integers(EPISODES, config.n_envs)?;
     let n_actions = checkpoint.integers(N_ACTIONS, config.n_envs)?;
-    let mut actions = checkpoint.bytes(ACTION_INDICES)?;
+    let n_total = usize::try_from(n_actions.iter().fold(0, |sum: u64, n| sum.saturating_add(*n)));
+    let n_total = n_total.map_err(|_| CheckpointError::section(N_ACTIONS, "is too large"))?;
+    let indices = checkpoint.integers(ACTION_INDICES, n_total)?;
     // Every action, and every episode but the first, takes a decision.
     let n_decisions = updates * config.n_steps as u64;
     if let Some(n) = episode_counts.iter().find(|n| **n > n_decisions) {
         return Err(CheckpointError::section(EPISODES, format!("has {n}")));
     }
-    if actions.iter().any(|action_index| usize::from(*action_index) >= ACTIONS.len()) {
+    let n_choices = config.action_space.n_actions() as u64;
+    if indices.iter().any(|action_index| *action_index >= n_choices) {
         return Err(CheckpointError::section(ACTION_INDICES, "has a value that is not an action"));
     }
-    let mut all_progress = Vec::new();
-    for (n_started, n) in episode_counts.iter().zip(n_actions) {
-        let split = usize::try_from(*n).ok().and_then(|n| actions.split_at_checked(n));
-        let Some((episode_actions, remaining)) = split else {
-            return Err(CheckpointError::section(
-                ACTION_INDICES,
-                format!("has fewer than {n} remaining"),
-            ));
-        };
-        all_progress
-            .push(EpisodeProgress { n_started: *n_started, actions: episode_actions.to_vec() });
-        actions = remaining;
-    }
-    match actions {
-        [] => Ok(all_progress),
-        more => {
-            Err(CheckpointError::section(ACTION_INDICES, format!("has {} too many", more.len())))
-        }
-    }
+    let mut indices = indices.iter();
+    let progress_of = |(n_started, n): (&u64, &u64)| EpisodeProgress {
+        n_started: *n_started,
+        actions: indices.by_ref().take(*n as usize).map(|index| *index as u16).collect(),
+    };
+    Ok(episode_counts.iter().zip(n_actions).map(progress_of).collect())
 }

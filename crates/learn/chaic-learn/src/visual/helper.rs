@@ -175,9 +175,9 @@ impl ObservationEncoder {
     }
 
     /// Returns the network's input, given the last observation; `None` before an episode.
-    pub(crate) fn encode(&self, observation: &Observation) -> Option<VisualObservation> {
+    pub(crate) fn encode(&mut self, observation: &Observation) -> Option<VisualObservation> {
         let briefing = self.briefing.as_ref()?;
-        let opponent = match (&self.opponent, self.agent.memory()) {
+        let opponent = match (&mut self.opponent, self.agent.memory()) {
             (Some(opponent), Some(memory)) => {
                 let prediction = opponent.predict(memory, briefing, self.agent.behavior());
                 let nearest = visible_objects(memory, &briefing.possible_targets).next();

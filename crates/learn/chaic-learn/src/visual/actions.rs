@@ -22,19 +22,17 @@ pub enum ActionSpace {
     Primitives,
 }
 
-/// Kinds of plans, those of the original's interface for learners.
-pub const PLANS: [&str; 8] = [
+/// Kinds of plans, those of the original's interface for learners. Its eighth kind, to wait, always
+/// explores there.
+pub const PLANS: [&str; 7] = [
     "pick_up_target",
     "pick_up_container",
     "deliver",
     "put_in",
     "explore",
-    "wait",
     "remove_obstacle",
     "follow_partner",
 ];
-/// Index of the wait in [`PLANS`].
-const WAIT_PLAN: usize = 5;
 
 /// Single actions, with the nearest visible object of a kind as target.
 pub const PRIMITIVES: [&str; 9] = [
@@ -103,24 +101,11 @@ fn kind_and_class(action_index: usize) -> (usize, ClassId) {
     (action_index / classes().len(), classes()[action_index % classes().len()])
 }
 
-/// Choice of [`ActionSpace::Plans`], given the plans that can be started.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum PlanChoice {
-    /// Wait.
-    Wait,
-    /// Start the valid plan with this index.
-    Start(usize),
-    /// No plan of this kind can be started.
-    Invalid,
-}
-
-/// Finds the chosen plan: of the chosen kind, for the nearest object of the chosen class, or the
-/// nearest of any class if none of the chosen class is known.
-pub(crate) fn resolve_plan(action_index: usize, valid: &[Plan]) -> PlanChoice {
+/// Returns the index of the chosen plan of [`ActionSpace::Plans`] among the valid ones: that for the
+/// nearest object of the chosen class, or the nearest of any class if none of the chosen class is
+/// known. `None` if no plan of the chosen kind is valid.
+pub(crate) fn resolve_plan(action_index: usize, valid: &[Plan]) -> Option<usize> {
     let (kind, class) = kind_and_class(action_index);
-    if kind == WAIT_PLAN {
-        return PlanChoice::Wait;
-    }
     let is_of_kind = |plan: &Plan| {
         matches!(
             (PLANS[kind], plan),
@@ -135,8 +120,7 @@ pub(crate) fn resolve_plan(action_index: usize, valid: &[Plan]) -> PlanChoice {
     };
     let is_of_class = |plan: &Plan| plan.subject().is_some_and(|subject| subject.class == class);
     let exact = valid.iter().position(|plan| is_of_kind(plan) && is_of_class(plan));
-    let found = exact.or_else(|| valid.iter().position(is_of_kind));
-    found.map_or(PlanChoice::Invalid, PlanChoice::Start)
+    exact.or_else(|| valid.iter().position(is_of_kind))
 }
 
 /// Returns an action of [`PRIMITIVES`] with its target; `None` if no visible object or no hand fits.
@@ -204,7 +188,7 @@ mod tests {
         Subject { track: TrackId(track), class: ClassId::named(class) }
     }
 
-    fn choice(kind: &str, class: &str, valid: &[Plan]) -> PlanChoice {
+    fn choice(kind: &str, class: &str, valid: &[Plan]) -> Option<usize> {
         let kind = PLANS.iter().position(|name| *name == kind).unwrap();
         let class = ClassId::named(class);
         let class = classes().iter().position(|c| *c == class).unwrap();
@@ -222,15 +206,14 @@ mod tests {
             Plan::TurnAround,
         ];
         for (kind, class, expected) in [
-            ("pick_up_target", "apple", PlanChoice::Start(3)),
-            ("pick_up_target", "orange", PlanChoice::Start(2)),
-            ("deliver", "apple", PlanChoice::Start(1)),
-            ("explore", "apple", PlanChoice::Start(0)),
-            ("wait", "apple", PlanChoice::Wait),
-            ("pick_up_container", "apple", PlanChoice::Invalid),
-            ("put_in", "apple", PlanChoice::Invalid),
-            ("remove_obstacle", "apple", PlanChoice::Invalid),
-            ("follow_partner", "apple", PlanChoice::Invalid),
+            ("pick_up_target", "apple", Some(3)),
+            ("pick_up_target", "orange", Some(2)),
+            ("deliver", "apple", Some(1)),
+            ("explore", "apple", Some(0)),
+            ("pick_up_container", "apple", None),
+            ("put_in", "apple", None),
+            ("remove_obstacle", "apple", None),
+            ("follow_partner", "apple", None),
         ] {
             assert_eq!(choice(kind, class, &valid), expected, "{kind} {class}");
         }
@@ -249,7 +232,7 @@ mod tests {
             (Plan::RemoveObstacle(it), "remove_obstacle"),
             (Plan::FollowPartner, "follow_partner"),
         ] {
-            assert_eq!(choice(kind, "banana", &[plan]), PlanChoice::Start(0), "{kind}");
+            assert_eq!(choice(kind, "banana", &[plan]), Some(0), "{kind}");
         }
     }
 }

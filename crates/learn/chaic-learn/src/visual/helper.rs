@@ -13,9 +13,7 @@ use chaic_env::helper_registry::Helper;
 use chaic_nn::Pass;
 use chaic_nn::weights::{self, WeightsError};
 
-use super::actions::{
-    ActionSpace, PAUSE, PlanChoice, resolve_plan, resolve_primitive, visible_objects,
-};
+use super::actions::{ActionSpace, PAUSE, resolve_plan, resolve_primitive, visible_objects};
 use super::network::VisualNetwork;
 use super::observation::{VisualObservation, opponent_features};
 use crate::actor_critic::ActorCritic as _;
@@ -202,21 +200,21 @@ impl ObservationEncoder {
     /// Begins the chosen plan or action, when a decision is due. Without a valid plan of the chosen
     /// kind the agent explores, as in the original; an action that cannot begin is a short wait.
     pub(crate) fn begin(&mut self, action_space: ActionSpace, action_index: usize) -> BegunAction {
-        let action = match action_space {
+        let begun = match action_space {
             ActionSpace::Primitives => {
                 let briefing = self.briefing.as_ref();
                 briefing.and_then(|it| resolve_primitive(action_index, &self.agent, it))
             }
-            ActionSpace::Plans => match resolve_plan(action_index, self.agent.policy().valid()) {
-                PlanChoice::Wait => Some(PAUSE),
-                PlanChoice::Start(plan) => self.start_plan(plan),
-                PlanChoice::Invalid => {
+            ActionSpace::Plans => {
+                let chosen = resolve_plan(action_index, self.agent.policy().valid());
+                let Some(plan) = chosen else {
                     let action = self.start_plan(EXPLORE).unwrap_or(PAUSE);
                     return BegunAction { action, is_invalid: true };
-                }
-            },
+                };
+                self.start_plan(plan)
+            }
         };
-        BegunAction { action: action.unwrap_or(PAUSE), is_invalid: action.is_none() }
+        BegunAction { action: begun.unwrap_or(PAUSE), is_invalid: begun.is_none() }
     }
 
     /// Starts a valid plan; returns its first action, or `None` if it has none.

@@ -40,21 +40,7 @@ pub struct Example {
 /// and seed, or its transport rate without baseline. Of equal values, the first key is selected, and no
 /// run is selected twice.
 pub fn examples(results: &[RunResult], helper: &str, baseline: Option<&str>) -> Vec<Example> {
-    let completed = |name: &str| -> BTreeMap<(TaskId, &str, u32), (&RunKey, &Summary)> {
-        let of_helper = results.iter().filter(|result| result.key.helper == name);
-        let runs = of_helper.filter_map(|result| Some((&result.key, result.summary()?)));
-        runs.map(|(key, summary)| ((key.task, &*key.episode, key.seed), (key, summary))).collect()
-    };
-    let baseline_runs = baseline.map(completed);
-    let candidate = |(place, (key, summary)): (_, (&RunKey, &Summary))| {
-        let other = match &baseline_runs {
-            Some(runs) => Some(runs.get(&place)?.1),
-            None => None,
-        };
-        Some(Candidate { key: key.clone(), summary: summary.clone(), other: other.cloned() })
-    };
-    let mut candidates: Vec<Candidate> =
-        completed(helper).into_iter().filter_map(candidate).collect();
+    let mut candidates = candidates(results, helper, baseline);
     let n = candidates.len().max(1) as f64;
     let mean = candidates.iter().map(Candidate::value).sum::<f64>() / n;
     let mut selected = Vec::new();
@@ -72,6 +58,46 @@ pub fn examples(results: &[RunResult], helper: &str, baseline: Option<&str>) -> 
     let n_first = usize::from(selected.len() == 3);
     selected.rotate_right(n_first);
     selected
+}
+
+/// Completed run of a helper beside that of a baseline on the same episode and seed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PairedRun {
+    /// The helper's episode run.
+    pub key: RunKey,
+    /// Its transport rate.
+    pub rate: f64,
+    /// Transport rate of the baseline.
+    pub baseline_rate: f64,
+}
+
+/// Returns the completed runs of a helper that the baseline completed as well, ordered by task, episode
+/// and seed.
+pub fn paired_runs(results: &[RunResult], helper: &str, baseline: &str) -> Vec<PairedRun> {
+    let pair = |candidate: Candidate| {
+        let (rate, baseline_rate) = (candidate.summary.rate(), candidate.other?.rate());
+        Some(PairedRun { key: candidate.key, rate, baseline_rate })
+    };
+    candidates(results, helper, Some(baseline)).into_iter().filter_map(pair).collect()
+}
+
+/// Returns the completed runs of a helper, each with the baseline's if there is a baseline. Without
+/// the baseline's run on its episode and seed, a run is left out.
+fn candidates(results: &[RunResult], helper: &str, baseline: Option<&str>) -> Vec<Candidate> {
+    let completed = |name: &str| -> BTreeMap<(TaskId, &str, u32), (&RunKey, &Summary)> {
+        let of_helper = results.iter().filter(|result| result.key.helper == name);
+        let runs = of_helper.filter_map(|result| Some((&result.key, result.summary()?)));
+        runs.map(|(key, summary)| ((key.task, &*key.episode, key.seed), (key, summary))).collect()
+    };
+    let baseline_runs = baseline.map(completed);
+    let candidate = |(place, (key, summary)): (_, (&RunKey, &Summary))| {
+        let other = match &baseline_runs {
+            Some(runs) => Some(runs.get(&place)?.1),
+            None => None,
+        };
+        Some(Candidate { key: key.clone(), summary: summary.clone(), other: other.cloned() })
+    };
+    completed(helper).into_iter().filter_map(candidate).collect()
 }
 
 /// Completed run with the baseline's run on the same episode and seed.

@@ -6,6 +6,7 @@
 //!
 //! **What it is not**: it plays nothing, draws nothing and knows no rules.
 
+mod overview;
 mod replays;
 mod summary;
 
@@ -20,6 +21,7 @@ use minijinja::{Environment, context};
 use miniz_oxide::deflate::compress_to_vec;
 use serde_json::json;
 
+pub use overview::{Dot, OverviewRow};
 pub use replays::{PageReplay, read_replays};
 pub use summary::{ActivityRow, ExampleRow, Gain, RunSummary, ScoreRow, Span};
 

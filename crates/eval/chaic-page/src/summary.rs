@@ -9,7 +9,7 @@ use chaic_env::helper_registry::NONE;
 use chaic_env::narration::ActivityKind;
 use chaic_eval::Result;
 use chaic_eval::activity::ActivityTotals;
-use chaic_eval::examples::{Example, ExampleRole, examples};
+use chaic_eval::examples::{Example, ExampleRole, examples, paired_runs};
 use chaic_eval::metrics::{Difference, Metric, Score, Scores};
 use chaic_eval::published::published;
 use chaic_eval::report::{Format, Labels, Report, number, rounded, shown_interval};
@@ -17,6 +17,7 @@ use chaic_eval::run::RunFolder;
 use serde::Serialize;
 
 use crate::data_link;
+use crate::overview::{OverviewRow, overview};
 use crate::replays::PageReplay;
 
 /// Report of a run for people.
@@ -34,6 +35,10 @@ pub struct RunSummary {
     pub example_rule: String,
     /// Example episodes.
     pub examples: Vec<ExampleRow>,
+    /// Helper of the overview; empty without runs to compare.
+    pub overview_helper: String,
+    /// All episodes of the helper with the largest gain, beside those without helper.
+    pub overview: Vec<OverviewRow>,
     /// Time by activity and failures, per helper and agent; empty without traces.
     pub activities: Vec<ActivityRow>,
     /// Limits of the figures.
@@ -136,7 +141,12 @@ impl RunSummary {
         let best = best_helper(&differences, &helpers);
         let has_none = helpers.iter().any(|helper| helper == NONE);
         let baseline = has_none.then_some(NONE).filter(|none| best.as_deref() != Some(none));
-        let examples = best.iter().flat_map(|best| examples(report.results, best, baseline));
+        let examples: Vec<Example> =
+            best.iter().flat_map(|best| examples(report.results, best, baseline)).collect();
+        let pairs = best.as_deref().zip(baseline);
+        let paired = pairs.map(|(best, baseline)| paired_runs(report.results, best, baseline));
+        let watched: Vec<&RunKey> = examples.iter().map(|example| &example.key).collect();
+        let overview = overview(&paired.unwrap_or_default(), &watched);
         let rows = score_rows(&scores, labels);
         Ok(RunSummary {
             lead: lead(&scores, labels, &differences, best.as_deref()),
@@ -144,7 +154,9 @@ impl RunSummary {
             has_paper: rows.iter().any(|row| row.span.paper.is_some()),
             scores: rows,
             example_rule: example_rule(labels, best.as_deref(), baseline),
-            examples: examples.map(ExampleRow::new).collect(),
+            overview_helper: pairs.map_or(String::new(), |(best, _)| name(labels, best)),
+            overview,
+            examples: examples.into_iter().map(ExampleRow::new).collect(),
             activities: activities(folder, report, labels, &helpers)?,
             notes: notes(report, &helpers),
             command: report.options.command(),

@@ -30,6 +30,12 @@ fn summary(text: &str) -> RunSummary {
         has_paper: true,
         example_rule: text.to_owned(),
         examples: Vec::new(),
+        overview_helper: text.to_owned(),
+        overview: vec![OverviewRow {
+            task: "Low target",
+            dots: vec![Dot { x: 25.0, y: 90.0, text: text.to_owned(), is_example: true }],
+            counts: [0, 0, 1],
+        }],
         activities: Vec::new(),
         notes: vec![text.to_owned()],
         command: text.to_owned(),
@@ -59,7 +65,7 @@ fn a_page_loads_nothing_from_elsewhere() {
 #[test]
 fn a_row_has_the_positions_of_its_values() {
     let text = page("title", Some(&summary("rhp")), &[]);
-    for part in ["cx=\"50.0\"", "M25.0 4H75.0", "M61.5 4l"] {
+    for part in ["cx=\"50.0\"", "M25.0 4H75.0", "M61.5 4l", "cx=\"25.0\" cy=\"90.0\""] {
         assert!(text.contains(part), "{part}");
     }
 }

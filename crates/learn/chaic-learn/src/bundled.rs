@@ -62,7 +62,7 @@ fn load_by_task(files: [(TaskId, &[u8]); 8]) -> LoadedPolicy {
 }
 
 /// All bundled helpers.
-static BUNDLED_HELPERS: [BundledHelper; 4] = [
+static BUNDLED_HELPERS: [BundledHelper; 5] = [
     BundledHelper {
         name: "cloned",
         about: "network that imitates infer",
@@ -80,8 +80,13 @@ static BUNDLED_HELPERS: [BundledHelper; 4] = [
     },
     BundledHelper {
         name: "smart_help",
-        about: "rl_paper with a model of the partner: Smart-Help baseline of the paper",
+        about: "plans from images and a model of the partner: Smart-Help baseline of the paper",
         policy: policies_by_task!("smart_help"),
+    },
+    BundledHelper {
+        name: "smart_help_plus",
+        about: "cloned with a model of the partner",
+        policy: policy!("smart_help_plus"),
     },
 ];
 

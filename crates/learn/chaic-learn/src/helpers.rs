@@ -42,7 +42,7 @@ enum PolicyError {
         TaskId::NoConstraint
     )]
     EmptyFolder { path: PathBuf },
-    #[error("{}: other inputs than the policies of other tasks in this folder", path.display())]
+    #[error("{}: other inputs or actions than the policies of other tasks in this folder", path.display())]
     OtherInputs { path: PathBuf },
 }
 

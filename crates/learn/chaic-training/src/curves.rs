@@ -101,13 +101,17 @@ pub(crate) fn has_lines(folder: &Path) -> bool {
     folder.join(CURVES).symlink_metadata().is_ok_and(|metadata| metadata.len() > 0)
 }
 
-/// Removes the lines after `last`, and lines that are incomplete or repeated.
+/// Removes the lines after `last`, and lines that are incomplete or repeated. Returns the position of
+/// the last line that is left.
 ///
 /// A killed training may have written lines after its last checkpoint; it writes them again.
-pub(crate) fn truncate_after(folder: &Path, last: Option<Position>) -> Result<(), FileError> {
+pub(crate) fn truncate_after(
+    folder: &Path,
+    last: Option<Position>,
+) -> Result<Option<Position>, FileError> {
     let path = folder.join(CURVES);
     if !path.exists() {
-        return Ok(());
+        return Ok(None);
     }
     let bytes = read_bounded(&path, MAX_BYTES)?;
     if bytes.len() as u64 == MAX_BYTES {
@@ -124,7 +128,10 @@ pub(crate) fn truncate_after(folder: &Path, last: Option<Position>) -> Result<()
             previous = Some(at);
         }
     }
-    if kept == bytes { Ok(()) } else { write_atomically(&path, &kept) }
+    if kept != bytes {
+        write_atomically(&path, &kept)?;
+    }
+    Ok(previous)
 }
 
 #[cfg(test)]

@@ -211,7 +211,12 @@ impl<T: Trainer> TrainingRun<T> {
             }
         }
         let phase = if validation_is_due { Phase::Train } else { Phase::Validation };
-        curves::truncate_after(folder, Some(Position { step: trainer.steps_done(), phase }))?;
+        let position = Position { step: trainer.steps_done(), phase };
+        let last = curves::truncate_after(folder, Some(position))?;
+        // If the configuration now ends the training here, its last step was not validated.
+        validation_is_due |= position.step > 0
+            && position.step == trainer.total_steps()
+            && last != Some(Position { phase: Phase::Validation, ..position });
         let folder = folder.to_owned();
         Ok(Some(TrainingRun {
             folder,

@@ -281,6 +281,28 @@ fn a_training_that_is_stopped_anywhere_ends_with_the_same_files() {
 }
 
 #[test]
+fn a_training_that_is_cut_short_has_the_weights_of_its_last_step() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut run = start(dir.path(), &ToyConfig::default());
+    let stop_at = |record: &CurveRecord, stop: &AtomicBool| {
+        stop.store(record.step == 3, Ordering::Relaxed);
+    };
+    assert!(!run_to_end(&mut run, &mut |record, stop| stop_at(record, stop)));
+    let (n_done, _) = run.progress();
+    assert!(n_done < 8 && !dir.path().join(Toy::<false>::WEIGHTS).exists(), "no validation yet");
+    drop(run);
+    let path = dir.path().join(CONFIG);
+    let config = fs::read_to_string(&path).unwrap();
+    fs::write(&path, config.replace("steps = 24", &format!("steps = {n_done}"))).unwrap();
+    let mut run = resume(dir.path()).unwrap();
+    assert_eq!(run.progress(), (n_done, n_done));
+    assert!(run_to_end(&mut run, &mut |_, _| ()));
+    assert!(dir.path().join(Toy::<false>::WEIGHTS).exists());
+    let curves = fs::read_to_string(dir.path().join(CURVES)).unwrap();
+    assert!(curves.contains(&format!("\"validation\",\"step\":{n_done}")), "{curves}");
+}
+
+#[test]
 fn a_second_process_in_a_folder_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     let run = start(dir.path(), &ToyConfig::default());

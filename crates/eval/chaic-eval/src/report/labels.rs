@@ -175,12 +175,13 @@ fn readable_names(names: &[String]) -> String {
 }
 
 /// Titles of helpers that other crates register.
-const EXTERNAL_TITLES: [(&str, &str); 9] = [
+const EXTERNAL_TITLES: [(&str, &str); 10] = [
     (NONE, "w/o"),
     ("cloned", "Cloned"),
     ("rl", "RL"),
     ("rl_paper", "RL, paper's recipe"),
     ("smart_help", "Smart-Help"),
+    ("smart_help_plus", "Smart-Help+"),
     ("llm", "LLM"),
     ("llm-told", "LLM, told"),
     ("vlm", "VLM"),

@@ -83,17 +83,6 @@ impl ActionSpace {
     pub fn n_actions(self) -> usize {
         self.head_sizes().iter().product()
     }
-
-    /// Description of an action.
-    pub fn name(self, action_index: usize) -> String {
-        match self {
-            ActionSpace::Plans => {
-                let (kind, class) = kind_and_class(action_index);
-                format!("{}, {}", PLANS[kind], class.info().label)
-            }
-            ActionSpace::Primitives => PRIMITIVES[action_index].to_owned(),
-        }
-    }
 }
 
 /// Splits an action of [`ActionSpace::Plans`] into the kind of plan and the class.
@@ -101,9 +90,9 @@ fn kind_and_class(action_index: usize) -> (usize, ClassId) {
     (action_index / classes().len(), classes()[action_index % classes().len()])
 }
 
-/// Returns the index of the chosen plan of [`ActionSpace::Plans`] among the valid ones: that for the
-/// nearest object of the chosen class, or the nearest of any class if none of the chosen class is
-/// known. `None` if no plan of the chosen kind is valid.
+/// Returns the index of the chosen plan of [`ActionSpace::Plans`] among the valid ones: the first
+/// one for an object of the chosen class, or the first of any class if none of the chosen class is
+/// known. Objects to pick up are sorted by distance. `None` if no plan of the chosen kind is valid.
 pub(crate) fn resolve_plan(action_index: usize, valid: &[Plan]) -> Option<usize> {
     let (kind, class) = kind_and_class(action_index);
     let is_of_kind = |plan: &Plan| {

@@ -84,8 +84,8 @@ impl EnvRunner {
         Ok(EnvRunner { slot, n_started, env, encoder, actions: Vec::new(), observation, pass })
     }
 
-    /// Takes a decision and advances to the next one or the end. After the end the observation is
-    /// outdated.
+    /// Takes a decision and advances to the next one or the end, at most the duration of a plan (1,000
+    /// frames). After the end the observation is outdated.
     fn act(
         &mut self,
         action_index: usize,

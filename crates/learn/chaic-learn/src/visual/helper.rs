@@ -13,7 +13,9 @@ use chaic_env::helper_registry::Helper;
 use chaic_nn::Pass;
 use chaic_nn::weights::{self, WeightsError};
 
-use super::actions::{ActionSpace, PAUSE, resolve_plan, resolve_primitive, visible_objects};
+use super::actions::{
+    ActionSpace, PAUSE, PRIMITIVES, resolve_plan, resolve_primitive, visible_objects,
+};
 use super::network::VisualNetwork;
 use super::observation::{VisualObservation, opponent_features};
 use crate::actor_critic::ActorCritic as _;
@@ -234,14 +236,17 @@ pub(crate) struct BegunAction {
     pub(crate) is_invalid: bool,
 }
 
+/// Random stream of the decisions. Another name would move the scores of `rl_paper`.
+const RNG_STREAM: &str = "primitive policy";
+
 /// Helper that acts by a visual policy.
 pub struct VisualHelper {
     policies: Arc<VisualPolicies>,
     encoder: ObservationEncoder,
     current: Option<CurrentPolicy>,
     rng: RngStream,
-    /// Description of the last decision.
-    last_decision: String,
+    /// Last primitive action; `None` if the policy chooses plans, which the agent describes.
+    last_primitive: Option<&'static str>,
 }
 
 /// Policy of the current episode.
@@ -259,9 +264,8 @@ impl VisualHelper {
     ) -> Helper {
         let (encoder, grants) = ObservationEncoder::new(rules, perception, policies.opponent());
         let grants = Grants { task: matches!(*policies, VisualPolicies::ByTask(_)), ..grants };
-        let rng = RngStream::new(0, "visual policy", 0);
-        let agent =
-            VisualHelper { policies, encoder, current: None, rng, last_decision: String::new() };
+        let rng = RngStream::new(0, RNG_STREAM, 0);
+        let agent = VisualHelper { policies, encoder, current: None, rng, last_primitive: None };
         Helper { agent: Box::new(agent), grants }
     }
 }
@@ -278,7 +282,7 @@ impl Agent for VisualHelper {
             CurrentPolicy { weights: Arc::clone(weights), pass: weights.model.pass() }
         });
         self.encoder.reset(briefing);
-        self.rng = RngStream::new(briefing.seed, "visual policy", 0);
+        self.rng = RngStream::new(briefing.seed, RNG_STREAM, 0);
     }
 
     fn act(&mut self, observation: &Observation) -> Result<Action, AgentError> {
@@ -295,8 +299,10 @@ impl Agent for VisualHelper {
         let Some(encoded) = self.encoder.encode(observation) else { return Ok(PAUSE) };
         let output = model.forward(parameters, std::iter::once(&encoded), pass).remove(0);
         let action_index = output.sample(self.rng.unit());
-        self.last_decision = model.action_space().name(action_index);
-        Ok(self.encoder.begin(model.action_space(), action_index).action)
+        let action_space = model.action_space();
+        let is_primitive = action_space == ActionSpace::Primitives;
+        self.last_primitive = is_primitive.then(|| PRIMITIVES[action_index]);
+        Ok(self.encoder.begin(action_space, action_index).action)
     }
 
     fn perception(&self) -> Option<String> {
@@ -308,6 +314,10 @@ impl Agent for VisualHelper {
     }
 
     fn thought(&self) -> Thought {
-        Thought { plan: self.last_decision.clone(), ..self.encoder.agent.thought() }
+        let thought = self.encoder.agent.thought();
+        match self.last_primitive {
+            Some(primitive) => Thought { plan: primitive.to_owned(), ..thought },
+            None => thought,
+        }
     }
 }

@@ -1,5 +1,4 @@
-//! Input of visual policies: color and depth, the memory as a map, and the agent's
-//! state.
+//! Input of visual policies: color and depth, the memory as a map, and the agent's state.
 
 use chaic_agents::PlanningAgent;
 use chaic_agents::memory::egocentric::{CHANNELS, EgocentricMap};

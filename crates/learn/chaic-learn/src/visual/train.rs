@@ -66,8 +66,8 @@ impl Trainer for VisualTrainer {
     type Config = VisualConfig;
     const KIND: &'static str = "visual";
     const WEIGHTS: &'static str = "policy.safetensors";
-    const RECORD_STEPS: u64 = 50;
-    const CHECKPOINT_STEPS: u64 = 500;
+    const RECORD_STEPS: u64 = 10;
+    const CHECKPOINT_STEPS: u64 = 10;
     const VALIDATION_STEPS: u64 = 2500;
     const BOUNDS: BoundTable = &[
         ("seed", SEED),
@@ -265,6 +265,9 @@ fn read_progress(
     let n_decisions = updates * config.n_steps as u64;
     if let Some(n) = episode_counts.iter().find(|n| **n > n_decisions) {
         return Err(CheckpointError::section(EPISODES, format!("has {n}")));
+    }
+    if let Some(n) = n_actions.iter().find(|n| **n > n_decisions) {
+        return Err(CheckpointError::section(N_ACTIONS, format!("has {n}")));
     }
     let n_choices = config.action_space.n_actions() as u64;
     if indices.iter().any(|action_index| *action_index >= n_choices) {

@@ -22,6 +22,7 @@ use chaic_learn::opponent::train::OpponentTrainer;
 use chaic_learn::train::{CloningConfig, PolicyTrainer, PpoTrainingConfig};
 use chaic_learn::visual::actions::ActionSpace;
 use chaic_learn::visual::network::VisualNetwork;
+use chaic_learn::visual::train::VisualTrainer;
 use chaic_nn::weights;
 use chaic_training::parse_config;
 
@@ -66,12 +67,11 @@ fn bundled_helpers_have_weights_with_a_digest() {
         let helper = registry.make(name, PlannerRules::paper()).unwrap();
         assert_eq!(helper.agent.weights().map(|digest| digest.len()), Some(12), "{name}");
         assert!(!helper.grants.goal && !helper.grants.progress, "{name}");
-        // Tests of the command play the others.
-        if helper.grants.task {
-            for task in TaskId::paper() {
-                let helper = registry.make(name, PlannerRules::paper()).unwrap();
-                assert!(play(helper, task).unwrap().len() > 5, "{name}, {task}");
-            }
+        // Without the grant, one policy plays all tasks.
+        let tasks = if helper.grants.task { 8 } else { 1 };
+        for task in TaskId::paper().take(tasks) {
+            let helper = registry.make(name, PlannerRules::paper()).unwrap();
+            assert!(play(helper, task).unwrap().len() > 5, "{name}, {task}");
         }
     }
 }
@@ -85,8 +85,22 @@ fn the_recipes_of_bundled_weights_are_valid() {
     }
     let recipe = include_str!("../../weights/rl.toml");
     assert!(parse_config::<PolicyTrainer<PpoTrainingConfig>>(recipe).is_ok());
-    let recipe = include_str!("../../weights/smart_help_opponent.toml");
-    assert!(parse_config::<OpponentTrainer>(recipe).is_ok());
+    for recipe in [
+        include_str!("../../weights/smart_help_opponent.toml"),
+        include_str!("../../weights/smart_help_plus_opponent.toml"),
+    ] {
+        assert!(parse_config::<OpponentTrainer>(recipe).is_ok());
+    }
+    // These need the weights of an opponent model.
+    let without_opponent = |recipe: &str| {
+        let line = "opponent = \"opponent/opponent.safetensors\"\n";
+        assert!(recipe.contains(line));
+        recipe.replace(line, "")
+    };
+    let recipe = without_opponent(include_str!("../../weights/smart_help.toml"));
+    assert!(parse_config::<VisualTrainer>(&recipe).is_ok());
+    let recipe = without_opponent(include_str!("../../weights/smart_help_plus.toml"));
+    assert!(parse_config::<PolicyTrainer<CloningConfig>>(&recipe).is_ok());
 }
 
 #[test]

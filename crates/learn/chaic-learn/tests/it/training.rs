@@ -227,7 +227,9 @@ fn stopped_steps_change_nothing() {
         rollout: small_rollout(),
         ..CloningConfig::default()
     });
-    check::<VisualTrainer>(&visual(ActionSpace::Primitives));
+    for action_space in ActionSpace::ALL {
+        check::<VisualTrainer>(&visual(action_space));
+    }
 }
 
 /// Returns a configuration in which updates end within episodes and episodes within updates.

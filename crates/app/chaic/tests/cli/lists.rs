@@ -72,7 +72,7 @@ fn lists_name_everything_that_options_take() {
         rows.map(|row| row["name"].as_str().expect("a name").to_owned()).collect()
     };
     let helpers = names("helpers");
-    assert_eq!(helpers.len(), 20, "{helpers:?}");
+    assert_eq!(helpers.len(), 21, "{helpers:?}");
     for helper in &helpers {
         let refused = run_err(at, &["eval", "--helper", helper, "--first", "0", "--out", "r"]);
         assert!(!refused.contains("unknown helper"), "{refused}");

@@ -158,7 +158,10 @@ fn damaged_checkpoints_and_values_out_of_bounds_are_refused() {
     fn check<T: Trainer>(config: &T::Config) {
         let folder = tempfile::tempdir().unwrap();
         let trainer = T::new(config, folder.path(), &mut |_| (), &NEVER_STOP);
-        refuses_damaged_checkpoints(&mut trainer.unwrap().unwrap());
+        let mut trainer = trainer.unwrap().unwrap();
+        // Sections of taken decisions are empty before the first step.
+        trainer.step(&NEVER_STOP).unwrap().unwrap();
+        refuses_damaged_checkpoints(&mut trainer);
         bounds_every_number::<T>();
     }
     let policy = PpoTrainingConfig { rollout: small_rollout(), ..PpoTrainingConfig::default() };

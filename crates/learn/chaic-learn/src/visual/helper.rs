@@ -62,7 +62,7 @@ impl VisualWeights {
 pub enum VisualPolicies {
     /// One policy for all tasks.
     AllTasks(Arc<VisualWeights>),
-    /// One policy per task, all with the same inputs. The helper is granted the task, which selects
+    /// One policy per task, all with the same inputs and actions. The helper is granted the task, which selects
     /// its policy.
     ByTask(Vec<(TaskId, Arc<VisualWeights>)>),
 }
@@ -71,7 +71,7 @@ impl VisualPolicies {
     /// Combines policies of single tasks.
     ///
     /// # Errors
-    /// The first task whose policy has other inputs than that of the first one.
+    /// The first task whose policy has other inputs or actions than that of the first one.
     pub fn by_task(
         policies: impl IntoIterator<Item = (TaskId, VisualWeights)>,
     ) -> Result<VisualPolicies, TaskId> {
@@ -193,7 +193,7 @@ impl ObservationEncoder {
     /// Returns the next action of the current plan; `None` if a decision is due.
     pub(crate) fn continue_plan(&mut self, action_space: ActionSpace) -> Option<Action> {
         match action_space {
-            // Without a plan, the agent lists the valid ones and halts.
+            // Without a plan, the agent lists the valid ones and halts; it has no other error.
             ActionSpace::Plans => self.agent.next_action().ok(),
             ActionSpace::Primitives => None,
         }

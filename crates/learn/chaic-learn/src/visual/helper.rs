@@ -62,8 +62,8 @@ impl VisualWeights {
 pub enum VisualPolicies {
     /// One policy for all tasks.
     AllTasks(Arc<VisualWeights>),
-    /// One policy per task, all with the same inputs and actions. The helper is granted the task, which selects
-    /// its policy.
+    /// One policy per task, all with the same inputs and actions. The helper is granted the task,
+    /// which selects its policy.
     ByTask(Vec<(TaskId, Arc<VisualWeights>)>),
 }
 

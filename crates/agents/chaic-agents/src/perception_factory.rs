@@ -5,10 +5,13 @@ use chaic_core::observation::{Grants, SensorConfig};
 use chaic_core::AgentId;
 
 use crate::behavior::BehaviorModel;
-use crate::perception::{GroundTruthIds, Perception};
+use crate::perception::{GroundTruthIds, Perception, PixelTargets};
 
 /// Name that selects [`GroundTruthPerceptionFactory`], which has no name in traces.
 pub const GROUND_TRUTH: &str = "gt";
+
+/// Name that selects [`GroundTruthTracksFactory`].
+pub const GT_TRACKS: &str = "gt_tracks";
 
 /// Kind of perception: its name, its required sensors and grants, and constructors of its parts.
 pub trait PerceptionFactory: Send + Sync {
@@ -51,5 +54,27 @@ impl PerceptionFactory for GroundTruthPerceptionFactory {
 
     fn perception(&self) -> Box<dyn Perception> {
         Box::new(GroundTruthIds)
+    }
+}
+
+/// Factory of [`GroundTruthIds`] for agents that act on pixels: it measures what pointing costs.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct GroundTruthTracksFactory;
+
+impl PerceptionFactory for GroundTruthTracksFactory {
+    fn name(&self) -> Option<String> {
+        Some(GT_TRACKS.to_owned())
+    }
+
+    fn sensors(&self) -> SensorConfig {
+        SensorConfig::DEPTH_AND_IDS
+    }
+
+    fn grants(&self, requested: Grants) -> Grants {
+        requested
+    }
+
+    fn perception(&self) -> Box<dyn Perception> {
+        Box::new(PixelTargets::<GroundTruthIds>::default())
     }
 }

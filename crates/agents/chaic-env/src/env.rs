@@ -248,6 +248,15 @@ impl Env {
         turn.rendered.as_ref().map(|rendered| &rendered.observation)
     }
 
+    /// Renders the color image of an agent: RGB, u8, shape [height, width, 3].
+    ///
+    /// It is for learners that need color at few observations. Their sensors have none, which saves most
+    /// of the time of an observation.
+    pub fn render_color(&self, agent: AgentId) -> Vec<u8> {
+        let image_size = self.slots[agent.index()].sensors.image_size;
+        self.renderer.render_color(&self.world, agent, image_size)
+    }
+
     /// Renders the observation of an agent with its images in the caller's buffers.
     pub(crate) fn observe_into(&mut self, agent: AgentId, images: ImagesMut<'_>) {
         let turn = &mut self.turns[agent.index()];

@@ -131,6 +131,16 @@ impl ObservationRenderer {
         history.extend(images.pop().map(|images| HistoryFrame { frame, camera, images }));
     }
 
+    /// Renders the color image of an agent.
+    pub(crate) fn render_color(&self, world: &World, agent: AgentId, image_size: u32) -> Vec<u8> {
+        let channels = Channels { rgb: true, depth: false, ids: false };
+        let view = View::from_agent(world, agent, image_size, channels);
+        let mut rgb = vec![0; 3 * view.camera.width as usize * view.camera.height as usize];
+        let images = ImagesMut { rgb: Some(&mut rgb), ..ImagesMut::default() };
+        self.scene.render_view_into(world, &view, images);
+        rgb
+    }
+
     /// Renders the observation of one agent with its images in the caller's buffers. The buffer `ids`
     /// becomes the id image that resolves pixels in actions.
     pub(crate) fn observe_into(

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use chaic_agents::perception_factory::{
-    GROUND_TRUTH, GroundTruthPerceptionFactory, PerceptionFactory,
+    GROUND_TRUTH, GT_TRACKS, GroundTruthPerceptionFactory, GroundTruthTracksFactory,
+    PerceptionFactory,
 };
 use chaic_files::{FileError, read_user_file};
 use chaic_nn::weights::WeightsError;
@@ -109,6 +110,9 @@ fn factory_from_name(name: &str) -> Result<Arc<dyn PerceptionFactory>, Perceptio
     if name == GROUND_TRUTH {
         return Ok(Arc::new(GroundTruthPerceptionFactory));
     }
+    if name == GT_TRACKS {
+        return Ok(Arc::new(GroundTruthTracksFactory));
+    }
     if name == LEARNED {
         return Ok(Arc::new(LearnedPerceptionFactory::new(TrainedDetector::built_in())));
     }
@@ -146,7 +150,7 @@ fn factory_from_name(name: &str) -> Result<Arc<dyn PerceptionFactory>, Perceptio
         )));
     }
     Err(PerceptionError::Unknown(format!(
-        "no perception `{name}`; write {GROUND_TRUTH}, {GT_MASKS}, {GT_NAMES}, {LEARNED}, {LEARNED}:FILE, \
-         {NOISY} or {NOISY}:FILE"
+        "no perception `{name}`; write {GROUND_TRUTH}, {GT_TRACKS}, {GT_MASKS}, {GT_NAMES}, {LEARNED}, \
+         {LEARNED}:FILE, {NOISY} or {NOISY}:FILE"
     )))
 }

@@ -141,6 +141,8 @@ struct Track {
     position: Vec3,
     /// Extent of all its points since it moved last; `None` for small objects.
     extent: Option<PlanExtent>,
+    /// Its highest point seen since it moved last, meters.
+    top_m: f32,
     last_seen: Frame,
     /// Log odds that the object exists.
     log_odds: f32,
@@ -419,6 +421,7 @@ impl Tracker {
             label: measurement.label(),
             position: measurement.extent.position_in_world,
             extent: None,
+            top_m: 0.0,
             last_seen: now,
             log_odds: 0.0,
             is_carried: false,
@@ -476,6 +479,8 @@ impl Track {
         self.position = measurement.extent.position_in_world;
         let seen = large_extent(self.label, measurement);
         let has_moved = self.is_carried || self.is_released || is_carried;
+        let top_m = measurement.extent.top_m;
+        self.top_m = if has_moved { top_m } else { self.top_m.max(top_m) };
         self.extent = match (&self.extent, seen) {
             (Some(extent), Some(seen)) if !has_moved => {
                 // A mask that overlaps a neighbor does not enlarge the object.

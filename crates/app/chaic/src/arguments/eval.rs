@@ -95,7 +95,7 @@ pub struct EvalArguments {
     #[arg(long, value_name = "NAME")]
     pub track: Option<Track>,
     /// Object detection of helpers: gt (ids from ground truth), learned (the built-in detector),
-    /// noisy, gt_names (each also as NAME:FILE) or gt_masks; docs/perception.md [default: gt].
+    /// noisy, gt_names (each also as NAME:FILE), gt_masks or gt_tracks; docs/perception.md [default: gt].
     #[arg(long, value_name = "KIND")]
     pub perception: Option<String>,
     /// Behavior recognition of helpers: gt (granted state and held objects), learned (the built-in network)

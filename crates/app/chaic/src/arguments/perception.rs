@@ -196,7 +196,7 @@ pub struct BehaviorArguments {
 /// `chaic eval tracks`.
 #[derive(Args, Debug)]
 pub struct TracksArguments {
-    /// Evaluated perception: learned, noisy, gt_names (each also as NAME:FILE) or gt_masks.
+    /// Evaluated perception: learned, noisy, gt_names (each also as NAME:FILE), gt_masks or gt_tracks.
     #[arg(long, value_name = "KIND", default_value = "learned")]
     pub perception: String,
     /// Number of episodes; tasks take turns, 1 to 100000.

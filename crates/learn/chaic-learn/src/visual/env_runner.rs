@@ -74,12 +74,12 @@ impl EnvRunner {
         let mut env = Env::new(config, agents)?;
         encoder.reset(&env.briefing(AgentId::HELPER));
         env.advance(None)?;
-        let observation = env.observe(AgentId::HELPER).and_then(|observation| {
+        if let Some(observation) = env.observe(AgentId::HELPER) {
             encoder.observe(observation);
-            // No plan has begun: the agent lists the valid ones.
-            encoder.continue_plan(setup.model.action_space());
-            encoder.encode(observation)
-        });
+        }
+        // No plan has begun: the agent lists the valid ones.
+        encoder.continue_plan(setup.model.action_space());
+        let observation = encode(&mut encoder, &mut env);
         let observation = observation.expect("the helper decides before an episode ends");
         Ok(EnvRunner { slot, n_started, env, encoder, actions: Vec::new(), observation, pass })
     }
@@ -113,7 +113,7 @@ impl EnvRunner {
             match self.encoder.continue_plan(action_space) {
                 Some(next) => action = next,
                 None => {
-                    if let Some(encoded) = self.encoder.encode(observation) {
+                    if let Some(encoded) = encode(&mut self.encoder, &mut self.env) {
                         self.observation = encoded;
                     }
                     return Ok(outcome);
@@ -175,6 +175,14 @@ impl EnvRunner {
     fn evaluate(&mut self, model: &VisualNetwork, parameters: &[f32]) -> ActorCriticOutput {
         model.forward(parameters, std::iter::once(&self.observation), &mut self.pass).remove(0)
     }
+}
+
+/// Encodes the last observation. Draws its color image, which plans in progress do not need, unless the
+/// perception has already asked for it.
+fn encode(encoder: &mut ObservationEncoder, env: &mut Env) -> Option<VisualObservation> {
+    let drawn = (!encoder.sensors().rgb).then(|| env.render_color(AgentId::HELPER));
+    let observation = env.observe(AgentId::HELPER)?;
+    encoder.encode(observation, drawn.as_deref().or(observation.images.rgb.as_deref()))
 }
 
 /// Experience of one environment between two updates.

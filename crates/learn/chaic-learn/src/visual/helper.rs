@@ -145,9 +145,9 @@ impl ObservationEncoder {
         (ObservationEncoder { agent, briefing: None, opponent }, grants)
     }
 
-    /// Returns the sensors, which include color and depth.
+    /// Returns the sensors that every observation needs.
     pub(crate) fn sensors(&self) -> SensorConfig {
-        SensorConfig { rgb: true, depth: true, ..self.agent.sensors() }
+        SensorConfig { depth: true, ..self.agent.sensors() }
     }
 
     /// Replaces the opponent model by another one with the same grant.
@@ -174,8 +174,13 @@ impl ObservationEncoder {
         }
     }
 
-    /// Returns the network's input, given the last observation; `None` before an episode.
-    pub(crate) fn encode(&mut self, observation: &Observation) -> Option<VisualObservation> {
+    /// Returns the network's input, given the last observation and its color image; `None` before an
+    /// episode.
+    pub(crate) fn encode(
+        &mut self,
+        observation: &Observation,
+        rgb: Option<&[u8]>,
+    ) -> Option<VisualObservation> {
         let briefing = self.briefing.as_ref()?;
         let opponent = match (&mut self.opponent, self.agent.memory()) {
             (Some(opponent), Some(memory)) => {
@@ -187,7 +192,7 @@ impl ObservationEncoder {
             }
             _ => Vec::new(),
         };
-        Some(VisualObservation::new(observation, &self.agent, briefing, opponent))
+        Some(VisualObservation::new(observation, rgb, &self.agent, briefing, opponent))
     }
 
     /// Returns the next action of the current plan; `None` if a decision is due.
@@ -272,7 +277,8 @@ impl VisualHelper {
 
 impl Agent for VisualHelper {
     fn sensors(&self) -> SensorConfig {
-        self.encoder.sensors()
+        // The environment draws before a decision is known to be due.
+        SensorConfig { rgb: true, ..self.encoder.sensors() }
     }
 
     fn reset(&mut self, briefing: &Briefing) {
@@ -296,7 +302,8 @@ impl Agent for VisualHelper {
         if let Some(action) = self.encoder.continue_plan(model.action_space()) {
             return Ok(action);
         }
-        let Some(encoded) = self.encoder.encode(observation) else { return Ok(PAUSE) };
+        let rgb = observation.images.rgb.as_deref();
+        let Some(encoded) = self.encoder.encode(observation, rgb) else { return Ok(PAUSE) };
         let output = model.forward(parameters, std::iter::once(&encoded), pass).remove(0);
         let action_index = output.sample(self.rng.unit());
         let action_space = model.action_space();

@@ -70,10 +70,11 @@ pub fn opponent_features(prediction: &OpponentPrediction, nearest_target: f32) -
 const MAX_DEPTH_M: f32 = 10.0;
 
 impl VisualObservation {
-    /// Creates the observation of an agent that has already processed `observation`; `opponent` are
-    /// the features of its opponent model, if it has one.
+    /// Creates the observation of an agent that has already processed `observation`; `rgb` is its color
+    /// image and `opponent` are the features of its opponent model, if it has one.
     pub fn new(
         observation: &Observation,
+        rgb: Option<&[u8]>,
         agent: &PlanningAgent<ExternalPolicy>,
         briefing: &Briefing,
         opponent: Vec<u8>,
@@ -88,7 +89,7 @@ impl VisualObservation {
             }
         }
         VisualObservation {
-            image: image(observation),
+            image: image(observation, rgb),
             map,
             state: state(observation, agent, briefing),
             opponent,
@@ -96,12 +97,11 @@ impl VisualObservation {
     }
 }
 
-fn image(observation: &Observation) -> Vec<u8> {
+fn image(observation: &Observation, rgb: Option<&[u8]>) -> Vec<u8> {
     let Camera { width, height, .. } = observation.camera;
     let stride = (width.min(height) as usize) / IMAGE_SIZE;
     let mut image = vec![0; IMAGE_SIZE * IMAGE_SIZE * IMAGE_CHANNELS];
-    let images = &observation.images;
-    let (Some(rgb), Some(depth_m)) = (&images.rgb, &images.depth_m) else { return image };
+    let (Some(rgb), Some(depth_m)) = (rgb, &observation.images.depth_m) else { return image };
     for (k, to) in image.chunks_exact_mut(IMAGE_CHANNELS).enumerate() {
         let [row, column] = [k / IMAGE_SIZE, k % IMAGE_SIZE].map(|x| x * stride + stride / 2);
         let from = row * width as usize + column;

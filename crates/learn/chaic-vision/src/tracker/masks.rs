@@ -49,14 +49,17 @@ impl Tracker {
         /// Distance around the extent in which points belong to the object, meters: points from above
         /// are 0.125 m apart.
         const MARGIN_M: f32 = 0.15;
-        /// Points below are floor, meters, and points above belong to no movable object.
-        const HEIGHT_M: [f32; 2] = [0.08, 2.0];
+        /// Points below are floor, meters.
+        const FLOOR_M: f32 = 0.08;
+        /// Points higher above the highest visible point of the object belong to a wall, meters.
+        const TOP_MARGIN_M: f32 = 0.1;
         let is_known = |track: &&Track| {
             let is_movable = pixel_kind(track.label) == PixelKind::Movable;
             is_movable && !track.is_released && track.log_odds > self.config.report_log_odds
         };
-        let extents: Vec<PlanExtent> =
-            self.tracks.iter().filter(is_known).filter_map(|track| track.extent).collect();
+        let extent_and_top = |track: &Track| Some((track.extent?, track.top_m + TOP_MARGIN_M));
+        let extents: Vec<(PlanExtent, f32)> =
+            self.tracks.iter().filter(is_known).filter_map(extent_and_top).collect();
         if extents.is_empty() {
             return;
         }
@@ -65,9 +68,11 @@ impl Tracker {
         for (k, is_dynamic) in mask.iter_mut().enumerate().filter(|(_, is_dynamic)| !**is_dynamic) {
             let (x, y) = (stride * (k % columns), stride * (k / columns));
             let point = camera.unproject(x as u32, y as u32, depth_m[y * width + x]);
-            if point.y > HEIGHT_M[0] && point.y < HEIGHT_M[1] {
+            if point.y > FLOOR_M {
                 let at = Vec2::new(point.x, point.z);
-                *is_dynamic = extents.iter().any(|extent| extent.contains(at, MARGIN_M));
+                *is_dynamic = extents
+                    .iter()
+                    .any(|(extent, top_m)| point.y < *top_m && extent.contains(at, MARGIN_M));
             }
         }
     }

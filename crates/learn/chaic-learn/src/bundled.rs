@@ -75,7 +75,7 @@ static BUNDLED_HELPERS: [BundledHelper; 5] = [
     },
     BundledHelper {
         name: "rl_paper",
-        about: "RL baseline of the paper: single actions from images",
+        about: "plans from images: RL baseline of the paper",
         policy: policies_by_task!("rl_paper"),
     },
     BundledHelper {

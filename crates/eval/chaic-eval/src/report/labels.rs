@@ -179,7 +179,7 @@ const EXTERNAL_TITLES: [(&str, &str); 10] = [
     (NONE, "w/o"),
     ("cloned", "Cloned"),
     ("rl", "RL"),
-    ("rl_paper", "RL, paper's recipe"),
+    ("rl_paper", "RL from images"),
     ("smart_help", "Smart-Help"),
     ("smart_help_plus", "Smart-Help+"),
     ("llm", "LLM"),

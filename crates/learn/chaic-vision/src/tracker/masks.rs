@@ -6,7 +6,7 @@ use chaic_core::geom::{Camera, Pose, rotate_yaw};
 use chaic_core::{ClassId, Hand, Vec2, Vec3};
 
 use super::plan_extent::PlanExtent;
-use super::{Track, Tracker, pixel_kind};
+use super::{Track, Tracker, extents_m, pixel_kind};
 
 /// Half extents of an unknown object, meters. A fire extinguisher, 1.06 m high, was taken for a pen.
 const UNKNOWN_M: Vec3 = Vec3::new(0.25, 0.55, 0.25);
@@ -51,13 +51,15 @@ impl Tracker {
         const MARGIN_M: f32 = 0.15;
         /// Points below are floor, meters.
         const FLOOR_M: f32 = 0.08;
-        /// Points higher above the highest visible point of the object belong to a wall, meters.
+        /// Points higher above the top of the object belong to a wall, meters.
         const TOP_MARGIN_M: f32 = 0.1;
         let is_known = |track: &&Track| {
             let is_movable = pixel_kind(track.label) == PixelKind::Movable;
             is_movable && !track.is_released && track.log_odds > self.config.report_log_odds
         };
-        let extent_and_top = |track: &Track| Some((track.extent?, track.top_m + TOP_MARGIN_M));
+        // A mask may miss the upper part.
+        let top_m = |track: &Track| track.top_m.max(extents_m(track.label)[1]);
+        let extent_and_top = |track: &Track| Some((track.extent?, top_m(track) + TOP_MARGIN_M));
         let extents: Vec<(PlanExtent, f32)> =
             self.tracks.iter().filter(is_known).filter_map(extent_and_top).collect();
         if extents.is_empty() {

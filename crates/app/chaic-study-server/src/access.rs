@@ -129,7 +129,9 @@ mod tests {
                 assert_eq!(hosts.has_origin(&with(ORIGIN, &[&origin])), is_allowed, "{origin}");
             }
         }
-        for origins in [&["null"][..], &[], &["ftp://localhost:8040"], &["http://b:9", "http://b:9"]] {
+        for origins in
+            [&["null"][..], &[], &["ftp://localhost:8040"], &["http://b:9", "http://b:9"]]
+        {
             assert!(!hosts.has_origin(&with(ORIGIN, origins)), "{origins:?}");
         }
         let public = AllowedHosts::new("192.0.2.1:80".parse().expect("an address"), &[]);

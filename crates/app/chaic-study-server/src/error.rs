@@ -33,7 +33,9 @@ pub enum ServerError {
     #[error("{} holds no digest of a token; remove it, and the participant cannot go on", .0.display())]
     Token(PathBuf),
     /// A name is none of a server.
-    #[error("`{0}` is no name of a server; expected a name such as study.example.org, without https://")]
+    #[error(
+        "`{0}` is no name of a server; expected a name such as study.example.org, without https://"
+    )]
     HostName(String),
     /// The address is that of all networks, so that the name in browsers is unknown.
     #[error("the address {0} needs a name that browsers use; add --host NAME")]

@@ -89,8 +89,7 @@ impl Log {
         }
         let bucket = TokenBucket::new(PARTICIPANT_RATE, now_secs);
         let n_records = data.records.len() + 1;
-        let log =
-            Log { path: path.to_owned(), check, n_records, n_bytes, is_torn: false, bucket };
+        let log = Log { path: path.to_owned(), check, n_records, n_bytes, is_torn: false, bucket };
         Ok((log, data.slot))
     }
 

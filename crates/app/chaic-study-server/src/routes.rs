@@ -13,7 +13,7 @@
 use std::sync::Arc;
 
 use axum::Router;
-use axum::body::{Body, Bytes, to_bytes};
+use axum::body::{Body, Bytes, HttpBody as _, to_bytes};
 use axum::extract::{Path, Request, State};
 use axum::http::header::{self, HeaderName, HeaderValue};
 use axum::http::{HeaderMap, Method, StatusCode};
@@ -166,10 +166,15 @@ async fn append(
 
 /// Reads a body of limited size.
 async fn read_text(body: Body) -> Result<String, Response> {
-    let Ok(bytes) = to_bytes(body, MAX_BODY_BYTES).await else {
+    let refused = || {
         let text = format!("the request is incomplete or longer than {MAX_BODY_BYTES} bytes");
-        return Err(refuse(StatusCode::PAYLOAD_TOO_LARGE, &text));
+        refuse(StatusCode::PAYLOAD_TOO_LARGE, &text)
     };
+    // A length in the headers is compared before anything is read.
+    if body.size_hint().lower() > MAX_BODY_BYTES as u64 {
+        return Err(refused());
+    }
+    let bytes = to_bytes(body, MAX_BODY_BYTES).await.map_err(|_| refused())?;
     String::from_utf8(bytes.into())
         .map_err(|_| refuse(StatusCode::UNPROCESSABLE_ENTITY, "the records are not UTF-8"))
 }

@@ -89,7 +89,8 @@ impl StudyServer {
         let page = study_page(&plan.study().title, &content);
         let store = Store::open(plan, folder, clock())?;
         let hosts = AllowedHosts::new(address, hosts);
-        let app = Arc::new(App { store, hosts, page: page.into(), policy: policy(), clock, report });
+        let app =
+            Arc::new(App { store, hosts, page: page.into(), policy: policy(), clock, report });
         Ok(StudyServer { runtime, listener, address, app })
     }
 
@@ -132,7 +133,9 @@ async fn serve(listener: tokio::net::TcpListener, router: Router, stop: &AtomicB
     let free = Arc::new(Semaphore::new(MAX_CONNECTIONS));
     let connections = GracefulShutdown::new();
     let mut http = http1::Builder::new();
-    http.timer(TokioTimer::new()).header_read_timeout(HEADER_TIMEOUT).max_buf_size(MAX_HEADER_BYTES);
+    http.timer(TokioTimer::new())
+        .header_read_timeout(HEADER_TIMEOUT)
+        .max_buf_size(MAX_HEADER_BYTES);
     let stopped = async {
         while !stop.load(Ordering::SeqCst) {
             sleep(STOP_INTERVAL).await;

@@ -299,10 +299,7 @@ fn read_token(path: &Path) -> Result<Option<TokenDigest>> {
 }
 
 /// Removes files that an interrupted entry or deletion left: temporary ones, and tokens without data.
-fn remove_leftovers(
-    folder: &Path,
-    by_code: &BTreeMap<String, Arc<Participant>>,
-) -> Result<()> {
+fn remove_leftovers(folder: &Path, by_code: &BTreeMap<String, Arc<Participant>>) -> Result<()> {
     for path in entries(folder)? {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let Some((code, ending)) = name.split_once('.').filter(|(code, _)| is_code(code)) else {

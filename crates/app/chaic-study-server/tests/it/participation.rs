@@ -95,7 +95,10 @@ fn slots_are_free_after_their_time_out_and_not_before() {
     let server = folder.server();
     assert_eq!([1, 2, 3].map(|n| server.client(n).slot()), [1, 2, 3]);
     let refused = server.client(4).enter();
-    assert_eq!((refused.status, refused.error().as_str()), (410, "all places of the study are taken"));
+    assert_eq!(
+        (refused.status, refused.error().as_str()),
+        (410, "all places of the study are taken")
+    );
     server.wait_secs(3599);
     assert_eq!(server.client(4).enter().status, 410);
     // The second participant finishes after the time-out, before the slot is given away.

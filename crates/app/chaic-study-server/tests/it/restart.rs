@@ -20,7 +20,8 @@ fn participants_go_on_after_a_restart() {
     let text = folder.text(&code(2));
     fs::write(&path, format!("{text}{}", &lines()[2][..20])).expect("the disk has space");
     fs::write(folder.data().join(format!("{}.token", code(9))), "").expect("the disk has space");
-    fs::write(folder.data().join(format!("{}.jsonl.tmp", code(9))), "").expect("the disk has space");
+    fs::write(folder.data().join(format!("{}.jsonl.tmp", code(9))), "")
+        .expect("the disk has space");
     fs::write(folder.data().join("notes.txt"), "kept").expect("the disk has space");
 
     let server = folder.server();

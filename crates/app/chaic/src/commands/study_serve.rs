@@ -44,7 +44,9 @@ pub fn run(arguments: &StudyServeArguments, format: OutputFormat) -> Result<Exit
     });
     print_result(format, &json, &text)?;
     if !server.address().ip().is_loopback() {
-        print_warning("connections are not encrypted; outside a laboratory, put a proxy with TLS before the server");
+        print_warning(
+            "connections are not encrypted; outside a laboratory, put a proxy with TLS before the server",
+        );
     }
     let counts = server.run(stop)?;
     print_progress(&format!(

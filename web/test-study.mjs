@@ -402,7 +402,7 @@ test("a server has every record, whatever fails in between, and deletes them", {
   assert.deepEqual(dataFiles(data), [`${code}.jsonl`]);
   ({ server } = await serve(data, new URL(url).host));
   await page.reload();
-  await page.getByText("in this browser and on the server are deleted").waitFor();
+  await page.getByText(/^All your data in this browser and on the server/).waitFor();
   assert.deepEqual(readdirSync(data).filter((name) => name !== ".lock"), []);
   assert.equal(await databases(page), 0);
   await context.close();

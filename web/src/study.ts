@@ -154,6 +154,8 @@ export class ChaicStudy extends LitElement {
   /** The participant agrees: the log comes into being. */
   private async agree(): Promise<void> {
     const { format, version, chaic, digest, server } = this.content!;
+    // A second click would ask for a second slot.
+    if (server) this.waits = "entry";
     const log = await StudyLog.open(this.logName(), true);
     if (!log) return;
     if (server) {

@@ -1,6 +1,6 @@
 //! Measures a server with many players: latency of uploads and processor time.
 //!
-//! `cargo run --release -p chaic-study-server --example load -- PLAYERS SECONDS`, 100 players for 30 seconds by
+//! `cargo run -p chaic-study-server --example load -- PLAYERS SECONDS`, 100 players for 30 seconds by
 //! default. Each player loads the page, enters and uploads one decision per second through one connection.
 
 use std::fs;

@@ -21,7 +21,7 @@ use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse as _, Response};
 use axum::routing::{get, put};
 use chaic_study::data::is_code;
-use serde_json::{Value, json};
+use serde_json::json;
 use tokio::task::spawn_blocking;
 use tokio::time::timeout;
 
@@ -108,8 +108,8 @@ async fn enter(
 ) -> Response {
     respond(app, code, &headers, StatusCode::CREATED, |app, code, token| {
         let Entered { start, stored } = app.store.enter(code, token, (app.clock)())?;
-        let start: Value = serde_json::from_str(&start).map_err(|_| Refusal::Changed)?;
-        Ok(json!({ "start": start, "stored": stored }))
+        // The line as it is: a parsed one would lose the order of its keys.
+        Ok(format!("{{\"start\":{},\"stored\":{stored}}}", start.trim_end()))
     })
     .await
 }
@@ -120,7 +120,7 @@ async fn stored(
     headers: HeaderMap,
 ) -> Response {
     respond(app, code, &headers, StatusCode::OK, |app, code, token| {
-        Ok(json!({ "stored": app.store.stored(code, token, (app.clock)())? }))
+        Ok(stored_json(app.store.stored(code, token, (app.clock)())?))
     })
     .await
 }
@@ -132,7 +132,7 @@ async fn withdraw(
 ) -> Response {
     respond(app, code, &headers, StatusCode::OK, |app, code, token| {
         app.store.withdraw(code, token)?;
-        Ok(json!({ "stored": 0 }))
+        Ok(stored_json(0))
     })
     .await
 }
@@ -159,7 +159,7 @@ async fn append(
         Err(response) => return response,
     };
     respond(app, code, &parts.headers, StatusCode::OK, move |app, code, token| {
-        Ok(json!({ "stored": app.store.append(code, token, from, &text, (app.clock)())? }))
+        Ok(stored_json(app.store.append(code, token, from, &text, (app.clock)())?))
     })
     .await
 }
@@ -185,7 +185,7 @@ async fn respond(
     code: String,
     headers: &HeaderMap,
     success: StatusCode,
-    perform: impl FnOnce(&App, &str, &TokenDigest) -> Result<Value, Refusal> + Send + 'static,
+    perform: impl FnOnce(&App, &str, &TokenDigest) -> Result<String, Refusal> + Send + 'static,
 ) -> Response {
     if !is_code(&code) {
         return refuse(StatusCode::NOT_FOUND, "there is no such page");
@@ -195,7 +195,7 @@ async fn respond(
     };
     let shared = Arc::clone(&app);
     match spawn_blocking(move || perform(&shared, &code, &token)).await {
-        Ok(Ok(answer)) => json_response(success, &answer),
+        Ok(Ok(answer)) => json_response(success, answer),
         Ok(Err(refusal)) => refusal_response(&app, &refusal),
         Err(_) => {
             (app.report)("a request of a participant has failed; this is an error of chaic");
@@ -225,15 +225,19 @@ fn refusal_response(app: &App, refusal: &Refusal) -> Response {
     if let Refusal::Gap { stored } = refusal {
         answer["stored"] = json!(stored);
     }
-    json_response(status, &answer)
+    json_response(status, answer.to_string())
 }
 
 /// Answers with an error.
 fn refuse(status: StatusCode, text: &str) -> Response {
-    json_response(status, &json!({ "error": text }))
+    json_response(status, json!({ "error": text }).to_string())
 }
 
-fn json_response(status: StatusCode, answer: &Value) -> Response {
+fn stored_json(stored: usize) -> String {
+    json!({ "stored": stored }).to_string()
+}
+
+fn json_response(status: StatusCode, answer: String) -> Response {
     let media_type = HeaderValue::from_static("application/json");
-    (status, [(header::CONTENT_TYPE, media_type)], answer.to_string()).into_response()
+    (status, [(header::CONTENT_TYPE, media_type)], answer).into_response()
 }

@@ -3,6 +3,7 @@
 
 use std::fs;
 
+use chaic_files::faults::{FaultKind, FaultPlan, install};
 use chaic_study::export::export;
 
 use crate::kit::{DEFINITION, Folder, lines};
@@ -23,6 +24,7 @@ fn a_participation_is_stored_as_sent_and_exported() {
     }
     let first = folder.text(&client.code).lines().next().expect("a line").to_owned();
     assert_eq!(&serde_json::from_str::<serde_json::Value>(&first).expect("JSON"), start);
+    assert!(entered.body.contains(&first), "the page gets the bytes of the file");
     assert_eq!(folder.text(&client.code), format!("{first}\n{}", lines.concat()));
     for file in folder.files() {
         let text = fs::read_to_string(folder.data().join(&file)).expect("a text");
@@ -150,4 +152,27 @@ fn a_file_that_another_program_removes_or_changes_is_not_written() {
     assert_eq!(answer.status, 500);
     assert_eq!(server.problems(), [answer.error()]);
     assert_eq!(folder.text(&other.code), changed);
+}
+
+#[test]
+fn records_that_the_disk_refuses_are_not_acknowledged_and_not_repeated() {
+    let folder = Folder::new(DEFINITION);
+    let server = folder.server();
+    let client = server.client(1);
+    client.slot();
+    let first = folder.text(&client.code);
+    // Each append opens, writes and synchronizes the file: the second synchronization fails.
+    let path = folder.data().join(format!("{}.jsonl", client.code));
+    assert!(install(Some(FaultPlan { path, index: 5, kind: FaultKind::IoError })));
+    let lines = lines();
+    assert_eq!(client.append(1, &lines[..2]).stored(), 3);
+    let refused = client.append(3, &lines[2..]);
+    assert_eq!(
+        (refused.status, refused.error().as_str()),
+        (500, "the server cannot store data now")
+    );
+    assert_eq!(folder.text(&client.code), first.clone() + &lines[..2].concat());
+    assert_eq!(server.problems().len(), 1);
+    assert_eq!(client.append(3, &lines[2..]).stored(), 8);
+    assert_eq!(folder.text(&client.code), first + &lines.concat());
 }

@@ -480,7 +480,7 @@ export class ChaicStudy extends LitElement {
       ${this.upload ? this.uploaded(this.upload) : nothing}`;
   }
 
-  /** Tells whether the server has all data. */
+  /** Shows whether the server has all data. */
   private uploaded({ state }: Upload): TemplateResult {
     if (state !== "saved") {
       return html`<p role="status">The server does not have all your data yet. Keep this page open, or open it again

@@ -145,11 +145,11 @@ impl Log {
             return Ok(());
         }
         if self.n_records + new.len() > MAX_RECORDS {
-            return Err(Refusal::Size("40,000 records"));
+            return Err(Refusal::Size(format!("{MAX_RECORDS} records")));
         }
         let bytes = new.concat();
         if self.n_bytes + bytes.len() > MAX_FILE_BYTES {
-            return Err(Refusal::Size("16 MiB"));
+            return Err(Refusal::Size(format!("{} MiB", MAX_FILE_BYTES >> 20)));
         }
         let mut check = self.check.clone();
         for (k, line) in new.iter().enumerate() {

@@ -33,7 +33,7 @@ pub enum Refusal {
     },
     /// The participant has more data than the server takes.
     #[error("a participant has at most {0}")]
-    Size(&'static str),
+    Size(String),
     /// The file of the participant was changed while the server ran.
     #[error("another program has changed the file of the participant")]
     Changed,

@@ -1,4 +1,4 @@
-//! The server: listens, bounds its connections, and ends when it is told to.
+//! The server: listens, bounds its connections, and ends when a flag is set.
 
 use std::io;
 use std::net::{SocketAddr, TcpListener};

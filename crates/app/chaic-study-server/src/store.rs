@@ -28,6 +28,7 @@ const SECS_PER_MINUTE: u64 = 60;
 ///
 /// Slots follow from the files: a slot is done if a participant with it has finished, and taken until the
 /// time-out of its last participant. A server that starts again counts the time-outs from its start.
+/// `chaic_study::SlotTable` has claims instead, which the files do not have.
 pub struct Store {
     plan: Plan,
     folder: PathBuf,

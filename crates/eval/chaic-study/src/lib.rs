@@ -3,8 +3,8 @@
 //! **What it is**: a [`Study`] is the content of `study.toml`. A [`Plan`] adds the conditions, the episodes
 //! and the digest, and assigns the trials of each slot. [`page_content`] is what the page of the study
 //! needs. [`ParticipantData`] is the file of a participant, whose records [`RecordCheck`] compares with the
-//! plan; [`export`] checks such files and writes data sets, [`deletion`] removes a participant. [`simulate`] gives the slots of a [`SlotTable`] to
-//! simulated participants.
+//! plan; [`export`] checks such files and writes data sets, [`deletion`] removes a participant. [`simulate`]
+//! gives the slots of a [`SlotTable`] to simulated participants.
 //!
 //! **What it is not**: it writes no HTML, receives no data and knows no names of participants.
 //!

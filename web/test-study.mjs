@@ -2,11 +2,13 @@
 //
 // Promises: nothing is stored before the consent; a participation by keyboard alone gives data that
 // `chaic study export` verifies; a reload loses nothing and goes on at the checkpoint; stopping deletes all
-// data; one switch suffices; axe finds nothing, and nothing is wider than the page.
+// data; one switch suffices; axe finds nothing, and nothing is wider than the page. With a server, the same holds for
+// its files, also if the network or the server fails in between; these tests need a command with the feature
+// `study-server`.
 
 import assert from "node:assert/strict";
-import { execFileSync } from "node:child_process";
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { execFileSync, spawn, spawnSync } from "node:child_process";
+import { existsSync, mkdtempSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
@@ -311,4 +313,141 @@ test("axe finds nothing, and nothing is wider than the page", async () => {
     await check("left");
     await context.close();
   }
+});
+
+/** Starts `chaic study serve` and returns its process and address. */
+async function serve(data, listen = "127.0.0.1:0") {
+  const command = ["study", "serve", definition, "--data", data, "--listen", listen, "--format", "json"];
+  const server = spawn(chaic, command, { stdio: ["ignore", "pipe", "inherit"] });
+  let printed = "";
+  for await (const text of server.stdout) {
+    printed += text;
+    if (printed.trimEnd().endsWith("}")) break;
+  }
+  return { server, url: JSON.parse(printed).url };
+}
+
+/** Ends a server by Ctrl-C. */
+function end(server) {
+  return new Promise((resolve) => {
+    server.once("exit", (code) => resolve(code));
+    server.kill("SIGINT");
+  });
+}
+
+/** Waits until a condition of this process holds. */
+async function until(condition) {
+  for (let n = 0; n < 600 && !condition(); n++) await new Promise((resolve) => setTimeout(resolve, 50));
+  assert.ok(condition(), String(condition));
+}
+
+const probe = spawnSync(chaic, ["study", "serve", "absent.toml", "--data", "absent"], { encoding: "utf8" });
+const skip = probe.stderr.includes("no study server") ? "this build of chaic has no study server" : false;
+
+/** Returns the files of participants in a folder. */
+const dataFiles = (data) => (existsSync(data) ? readdirSync(data).filter((name) => name.endsWith(".jsonl")) : []);
+
+/** Waits until the only file of a folder has all records of the page, and returns them. */
+async function uploaded(page, data) {
+  const expected = (await records(page)).map((record) => `${JSON.stringify(record)}\n`).join("");
+  await until(() => {
+    const [name] = dataFiles(data);
+    return name !== undefined && readFileSync(join(data, name), "utf8").startsWith(expected);
+  });
+  return expected;
+}
+
+test("a server has every record, whatever fails in between, and deletes them", { skip }, async () => {
+  const data = join(folder, "interrupted");
+  let { server, url } = await serve(data);
+  const context = await browser.newContext({ viewport: { width: 1280, height: 900 } });
+  const page = await context.newPage();
+  page.on("pageerror", (error) => assert.fail(error.message));
+  page.on("request", (request) => assert.ok(/^(blob|data):/.test(request.url()) || request.url().startsWith(url)));
+  await page.goto(url);
+  await heading(page, "Help with high shelves");
+  assert.deepEqual([await databases(page), dataFiles(data).length], [0, 0], "nothing is stored before the consent");
+  await page.getByRole("button", { name: "I agree" }).click();
+  await heading(page, "Instructions");
+  const code = await page.locator("b.code").innerText();
+  assert.deepEqual(dataFiles(data), [`${code}.jsonl`]);
+  await page.getByRole("button", { name: "Continue" }).click();
+  await page.getByRole("button", { name: "Start the episode" }).click();
+  await playTo(page, 60);
+  await uploaded(page, data);
+
+  await context.setOffline(true);
+  await playTo(page, 150);
+  await page.getByText("There is no connection to the server").waitFor();
+  await context.setOffline(false);
+  await uploaded(page, data);
+  await page.getByText("There is no connection to the server").waitFor({ state: "hidden" });
+
+  assert.equal(await end(server), 0);
+  await playTo(page, 240);
+  await page.getByText("There is no connection to the server").waitFor();
+  ({ server } = await serve(data, new URL(url).host));
+  const before = await uploaded(page, data);
+  await page.reload();
+  await heading(page, /^Episode 2 of 3$/);
+  const after = await uploaded(page, data);
+  assert.equal(after.slice(0, before.length), before);
+  assert.match(after, /"outcome":"left"\}\n$/);
+
+  // The participant stops while the server is away.
+  assert.equal(await end(server), 0);
+  await page.getByRole("button", { name: "Stop and delete" }).click();
+  await page.getByRole("button", { name: "Delete and stop" }).click();
+  await page.getByText("The server has not confirmed the deletion yet").waitFor();
+  assert.deepEqual(dataFiles(data), [`${code}.jsonl`]);
+  ({ server } = await serve(data, new URL(url).host));
+  await page.reload();
+  await page.getByText(/^All your data in this browser and on the server/).waitFor();
+  assert.deepEqual(readdirSync(data).filter((name) => name !== ".lock"), []);
+  assert.equal(await databases(page), 0);
+  await context.close();
+  assert.equal(await end(server), 0);
+});
+
+test("a participation with a server gives data that verify", { skip }, async () => {
+  const data = join(folder, "served");
+  const { server, url } = await serve(data);
+  const context = await browser.newContext({ viewport: { width: 1280, height: 900 } });
+  const page = await context.newPage();
+  page.on("pageerror", (error) => assert.fail(error.message));
+  // Violations of the policy, for example.
+  page.on("console", (message) => assert.notEqual(message.type(), "error", message.text()));
+  await page.goto(url);
+  await heading(page, "Help with high shelves");
+  await tabTo(page, /^I agree/);
+  await heading(page, "Instructions");
+  await tabTo(page, /^Continue/);
+  await trial(page, /^Episode 1 of 3, practice$/);
+  for (const title of [/^Episode 2 of 3$/, /^Episode 3 of 3$/]) {
+    await trial(page, title);
+    for (const form of ["Workload", "Trust"]) {
+      await heading(page, form);
+      await tabTo(page, /^Continue/);
+      await tabTo(page, /^Continue/);
+    }
+  }
+  await heading(page, "Usability");
+  await answer(page, 10);
+  await heading(page, "The end");
+  await page.getByText("The server has all your data").waitFor();
+  assert.deepEqual(await findings(page), []);
+  const text = await uploaded(page, data);
+  const [download] = await Promise.all([page.waitForEvent("download"), tabTo(page, /^Download/)]);
+  assert.equal(readFileSync(await download.path(), "utf8"), text);
+  await tabTo(page, /^Remove the copy/);
+  await page.getByText("The copy in this browser is removed").waitFor();
+  assert.equal(await databases(page), 0);
+  await page.reload();
+  await heading(page, "Help with high shelves");
+  await context.close();
+  assert.equal(await end(server), 0);
+  const out = join(folder, "served-set");
+  const command = ["study", "export", data, "--study", definition, "--out", out, "--format", "json"];
+  const report = JSON.parse(execFileSync(chaic, command, { encoding: "utf8" }));
+  assert.deepEqual([report.participants, report.completed, report.traces, report.verified], [1, 1, 3, 3]);
 });

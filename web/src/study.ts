@@ -1,5 +1,5 @@
-// Page of a study: consent, instructions, practice, blocks with forms, debriefing. Everything is in the page, and the
-// data stay in the browser until the participant downloads them.
+// Page of a study: consent, instructions, practice, blocks with forms, debriefing. Everything is in the page. The data
+// stay in the browser until the participant downloads them; the page of a server also sends them to it.
 
 import { html, LitElement, nothing, type TemplateResult } from "lit";
 import { query, state } from "lit/decorators.js";
@@ -19,8 +19,9 @@ import {
 } from "./study/content.js";
 import "./study/form.js";
 import type { ChaicForm } from "./study/form.js";
-import { lock, StudyLog } from "./study/log.js";
+import { lock, StudyLog, type Identity } from "./study/log.js";
 import { Scanner } from "./study/scanner.js";
+import { drawToken, Participant, Upload } from "./study/server.js";
 import { paragraphs } from "./study/text.js";
 
 /** Letters and digits of participant codes: those that are not mistaken for each other. */
@@ -48,6 +49,8 @@ export class ChaicStudy extends LitElement {
   @state() private isScanning = false;
   @state() private hasLeft = false;
   @state() private problem?: string;
+  /** State of a participation with a server, beside those of any. */
+  @state() private waits?: "entry" | "full" | "deletion" | "removed";
 
   @query("dialog") private dialog?: HTMLDialogElement;
   @query("chaic-play") private player?: ChaicPlay;
@@ -55,6 +58,9 @@ export class ChaicStudy extends LitElement {
 
   private game?: Game;
   private module?: ArrayBuffer;
+  /** Log of a participant who has agreed and whom the server may not know yet. */
+  private entering?: { log: StudyLog; participant: Participant };
+  private upload?: Upload;
   private readonly scanner = new Scanner(() => this.choices());
 
   protected override createRenderRoot(): HTMLElement {
@@ -75,25 +81,65 @@ export class ChaicStudy extends LitElement {
   private async load(): Promise<void> {
     const bytes = await embedded(document.getElementById("chaic-study")!);
     const content = JSON.parse(new TextDecoder().decode(bytes)) as StudyContent;
-    const slot = /^#(\d{1,5})$/.exec(location.hash)?.[1];
     this.content = content;
-    if (slot === undefined || !content.slots[Number(slot) - 1]) {
+    if (!content.server && !this.takeSlot(Number(/^#(\d{1,5})$/.exec(location.hash)?.[1]))) {
       this.isLoading = false;
       return;
     }
-    this.slotNumber = Number(slot);
-    this.steps = stepsOf(content, this.slotNumber);
     if (!(await lock(this.logName()))) {
       this.problem = "it is open in another tab. Go on there, or close that tab and load this page again.";
       return;
     }
     const log = await StudyLog.open(this.logName(), false);
-    if (log?.records.length) await this.resume(log);
+    const identity = await log?.readIdentity();
+    if (log && identity) await this.resumeWithServer(log, identity);
+    else if (log?.records.length) await this.resume(log);
     this.isLoading = false;
   }
 
+  /** Takes a slot from 1; returns false if the study has none of this number. */
+  private takeSlot(slot: number): boolean {
+    if (!this.content?.slots[slot - 1]) return false;
+    this.slotNumber = slot;
+    this.steps = stepsOf(this.content, slot);
+    return true;
+  }
+
   private logName(): string {
-    return `chaic-study-${this.content!.digest}-${this.slotNumber}`;
+    const { digest, server } = this.content!;
+    return `chaic-study-${digest}-${server ? "server" : this.slotNumber}`;
+  }
+
+  /** Goes on with a participation that a server stores: at the entry, at the checkpoint, or with the deletion. */
+  private async resumeWithServer(log: StudyLog, identity: Identity): Promise<void> {
+    const [start] = log.records;
+    if (identity.isLeaving) {
+      this.hasLeft = true;
+      void this.deleteEverywhere(log, identity);
+    } else if (start?.type !== "start") {
+      void this.enter(log, identity);
+    } else {
+      this.takeSlot(start.slot);
+      this.startUpload(log, new Participant(identity), undefined);
+      await this.resume(log);
+    }
+  }
+
+  private startUpload(log: StudyLog, participant: Participant, stored: number | undefined): void {
+    const changed = (): void => {
+      if (this.upload?.state === "refused") {
+        this.fail(`${this.upload.problem}. Your data are kept in this browser.`);
+      }
+      this.requestUpdate();
+    };
+    this.upload = new Upload(participant, log, stored, changed);
+    void this.upload.send();
+  }
+
+  /** Appends a record to the log, and sends it to the server if there is one. */
+  private async store(record: DataRecord): Promise<void> {
+    await this.log?.append(record);
+    void this.upload?.send();
   }
 
   /** Goes on at the checkpoint. An episode that was running counts as left. */
@@ -101,31 +147,62 @@ export class ChaicStudy extends LitElement {
     this.log = log;
     this.isResumed = true;
     const trial = openTrial(log.records);
-    if (trial !== undefined) await log.append({ type: "trial_end", trial, outcome: "left" });
+    if (trial !== undefined) await this.store({ type: "trial_end", trial, outcome: "left" });
     this.at = checkpoint(this.steps, log.records);
   }
 
   /** The participant agrees: the log comes into being. */
   private async agree(): Promise<void> {
-    const { format, version, chaic, digest } = this.content!;
+    const { format, version, chaic, digest, server } = this.content!;
+    // A second click would ask for a second slot.
+    if (server) this.waits = "entry";
     const log = await StudyLog.open(this.logName(), true);
     if (!log) return;
+    if (server) {
+      await this.enter(log);
+      return;
+    }
     const start = { format, version, chaic, study: digest, code: drawCode(), slot: this.slotNumber! };
     await log.append({ type: "start", ...start });
     this.log = log;
     this.focusHeading();
   }
 
+  /** Asks the server for a slot. A lost answer is asked for again with the same identity, also after a reload. */
+  private async enter(log: StudyLog, known?: Identity): Promise<void> {
+    const identity = known ?? { code: drawCode(), token: drawToken(), isLeaving: false };
+    if (!known) await log.setIdentity(identity);
+    const participant = new Participant(identity);
+    this.entering = { log, participant };
+    this.waits = "entry";
+    const entry = await participant.enter();
+    if (entry === "aborted") return;
+    this.entering = undefined;
+    if (entry === "taken") {
+      await this.enter(log);
+    } else if (entry === "full") {
+      await log.delete();
+      this.waits = "full";
+      this.focusHeading();
+    } else if (entry.start.type === "start" && this.takeSlot(entry.start.slot)) {
+      await log.append(entry.start);
+      this.waits = undefined;
+      this.log = log;
+      this.startUpload(log, participant, entry.stored);
+      this.focusHeading();
+    }
+  }
+
   /** Stores a record and goes on to the next step. */
   private async advance(record?: DataRecord): Promise<void> {
-    if (record) await this.log?.append(record);
+    if (record) await this.store(record);
     this.at += 1;
     this.playing = "before";
     this.game = undefined;
     this.isResumed = false;
     const isLast = this.steps[this.at]?.kind === "debrief";
     const isComplete = this.log?.records.some((known) => known.type === "complete");
-    if (isLast && !isComplete) await this.log?.append({ type: "complete" });
+    if (isLast && !isComplete) await this.store({ type: "complete" });
     this.focusHeading();
   }
 
@@ -135,9 +212,35 @@ export class ChaicStudy extends LitElement {
     // The episode stops first, so that it cannot append to a deleted log.
     this.playing = "before";
     this.game = undefined;
-    const { log } = this;
+    const { entering, upload } = this;
+    const log = this.log ?? entering?.log;
     this.log = undefined;
+    this.entering = undefined;
     this.hasLeft = true;
+    entering?.participant.abort();
+    upload?.stop();
+    const identity = await log?.readIdentity();
+    this.focusHeading();
+    if (log && identity) await this.deleteEverywhere(log, identity);
+    else await log?.delete();
+  }
+
+  /** Deletes the data in this browser, then those on the server. A reload goes on with what is left. */
+  private async deleteEverywhere(log: StudyLog, identity: Identity): Promise<void> {
+    this.waits = "deletion";
+    await log.setIdentity({ ...identity, isLeaving: true });
+    await log.clear();
+    await new Participant(identity).delete();
+    await log.delete();
+    this.waits = undefined;
+  }
+
+  /** Removes the copy in this browser after the end, for example before the next participant. */
+  private async removeCopy(): Promise<void> {
+    const { log } = this;
+    this.upload?.stop();
+    this.log = undefined;
+    this.waits = "removed";
     await log?.delete();
     this.focusHeading();
   }
@@ -160,7 +263,7 @@ export class ChaicStudy extends LitElement {
     this.module ??= await moduleBytes();
     const [, condition, episode, helper] = step.trial;
     const { seat, input } = content.conditions[condition]!;
-    await log.append({ type: "trial", trial: step.number });
+    await this.store({ type: "trial", trial: step.number });
     this.game = {
       module: this.module,
       episode: new TextEncoder().encode(content.episodes[episode]!),
@@ -173,7 +276,7 @@ export class ChaicStudy extends LitElement {
   }
 
   private endTrial(trial: number, outcome: TrialOutcome): void {
-    void this.log?.append({ type: "trial_end", trial, outcome }).then(() => {
+    void this.store({ type: "trial_end", trial, outcome }).then(() => {
       this.playing = "over";
       void this.updateComplete.then(() => this.querySelector<HTMLElement>("#continue")?.focus());
     });
@@ -216,6 +319,11 @@ export class ChaicStudy extends LitElement {
           ? html`<p class="problem" role="alert">The study cannot go on: ${this.problem}</p>`
           : nothing}
         <p class="small" role="status">${progress}</p>
+        <p class="small" role="status">
+          ${this.upload?.state === "waiting" && !this.hasLeft
+            ? "There is no connection to the server. Go on: your data are kept in this browser and sent later."
+            : nothing}
+        </p>
         ${this.current()}
       </section>
       ${this.question()}
@@ -241,7 +349,7 @@ export class ChaicStudy extends LitElement {
   private question(): TemplateResult {
     return html`<dialog aria-labelledby="leave-title">
       <h2 id="leave-title">Stop and delete?</h2>
-      <p>The study ends, and all your data in this browser are deleted.</p>
+      <p>The study ends, and all your data ${this.places()} are deleted.</p>
       <p>
         <button type="button" @click=${() => void this.leave()}>Delete and stop</button>
         <button type="button" @click=${() => this.dialog?.close()}>Go on with the study</button>
@@ -249,14 +357,31 @@ export class ChaicStudy extends LitElement {
     </dialog>`;
   }
 
+  private places(): string {
+    return this.content?.server ? "in this browser and on the server" : "in this browser";
+  }
+
   private current(): TemplateResult {
     const { content } = this;
     if (!content || this.isLoading) return this.problem ? html`` : html`<p role="status">Loading ...</p>`;
     if (this.hasLeft) {
       return html`${this.heading("You have stopped")}
-        <p>All your data in this browser are deleted. You may close this page.</p>`;
+        ${this.waits === "deletion"
+          ? html`<p>The server has not confirmed the deletion yet. Keep this page open, or open it again later.</p>`
+          : html`<p>All your data ${this.places()} are deleted. You may close this page.</p>`}`;
     }
-    if (this.slotNumber === undefined) return this.slotQuestion(content);
+    switch (this.waits) {
+      case "entry":
+        return html`${this.heading(content.title)}
+          <p role="status">The page asks the server for a place until it answers ...</p>`;
+      case "full":
+        return html`${this.heading("All places are taken")}
+          <p>Thank you. Nothing is stored. You may close this page.</p>`;
+      case "removed":
+        return html`${this.heading("The end")}
+          <p>The copy in this browser is removed. The next participant can load this page again.</p>`;
+    }
+    if (this.slotNumber === undefined && !content.server) return this.slotQuestion(content);
     if (!this.log) return this.consent(content);
     const step = this.steps[this.at]!;
     switch (step.kind) {
@@ -321,7 +446,7 @@ export class ChaicStudy extends LitElement {
         .workerSource=${workerSource()}
         .game=${this.game}
         @recorded=${(event: CustomEvent<string>) =>
-          void this.log?.append({ type: "trace", trial: step.number, text: event.detail })}
+          void this.store({ type: "trace", trial: step.number, text: event.detail })}
         @over=${(event: CustomEvent<TrialOutcome>) => this.endTrial(step.number, event.detail)}
       ></chaic-play>
       ${this.playing === "over"
@@ -343,15 +468,26 @@ export class ChaicStudy extends LitElement {
       )}`;
   }
 
-  private debrief({ debrief, completion_code }: StudyContent): TemplateResult {
-    return html`${this.heading("The end")} ${paragraphs(debrief)}
-      <p>Completion code: <b class="code">${completion_code}</b></p>
+  private debrief(content: StudyContent): TemplateResult {
+    return html`${this.heading("The end")} ${paragraphs(content.debrief)}
+      <p>Completion code: <b class="code">${content.completion_code}</b></p>
       <p>Your code: <b class="code">${this.code()}</b>. With it, the researchers can delete your data.</p>
       <p>
         <button type="button" @click=${() => this.download()}>Download your data</button>
       </p>
       <p class="small">The file has your answers and your decisions. It has no name, no address and no times of day.
-        "Stop and delete" removes the copy in this browser.</p>`;
+        "Stop and delete" removes ${content.server ? "all your data, also on the server" : "the copy in this browser"}.</p>
+      ${this.upload ? this.uploaded(this.upload) : nothing}`;
+  }
+
+  /** Shows whether the server has all data. */
+  private uploaded({ state }: Upload): TemplateResult {
+    if (state !== "saved") {
+      return html`<p role="status">The server does not have all your data yet. Keep this page open, or open it again
+        later. If that does not help, download your data and send them to the researchers.</p>`;
+    }
+    return html`<p role="status">The server has all your data. You may close this page.</p>
+      <p><button type="button" @click=${() => void this.removeCopy()}>Remove the copy in this browser</button></p>`;
   }
 }
 

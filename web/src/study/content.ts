@@ -46,6 +46,8 @@ export interface StudyContent {
   at_end: string[];
   conditions: Condition[];
   seed: number;
+  /** True if the page belongs to a server, which gives out the slots and stores the records. */
+  server?: boolean;
   /** Trials of each slot. */
   slots: Trial[][];
   /** Episodes (JSON). */

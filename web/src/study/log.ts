@@ -3,6 +3,17 @@
 import type { DataRecord } from "./content.js";
 
 const STORE = "records";
+/** Store of the identity at the server, and its only key. */
+const IDENTITY = "identity";
+const IDENTITY_KEY = 1;
+
+/** What a participant shows to the server of a study. The data have no token. */
+export interface Identity {
+  code: string;
+  token: string;
+  /** True if the participant has stopped, and the server may still have data. */
+  isLeaving: boolean;
+}
 
 function settled<T>(request: IDBRequest<T>): Promise<T> {
   return new Promise((resolve, reject) => {
@@ -29,20 +40,27 @@ export function lock(name: string): Promise<boolean> {
 
 /** Log of one participant. */
 export class StudyLog {
+  /** Number of records that the browser has stored. */
+  nStored: number;
+
   private constructor(
     private readonly name: string,
     private readonly database: IDBDatabase,
     /** All records in order. */
     readonly records: DataRecord[],
-  ) {}
+  ) {
+    this.nStored = records.length;
+  }
 
   /** Opens the log with a name. Without `mayCreate`, returns undefined if it does not exist, and creates nothing. */
   static async open(name: string, mayCreate: boolean): Promise<StudyLog | undefined> {
     const request = indexedDB.open(name, 1);
     let isRefused = false;
     request.onupgradeneeded = () => {
-      if (mayCreate) request.result.createObjectStore(STORE, { autoIncrement: true });
-      else {
+      if (mayCreate) {
+        request.result.createObjectStore(STORE, { autoIncrement: true });
+        request.result.createObjectStore(IDENTITY);
+      } else {
         isRefused = true;
         // The database does not come into being.
         request.transaction!.abort();
@@ -59,13 +77,39 @@ export class StudyLog {
   }
 
   /** Appends a record; resolves when the browser has stored it. */
-  append(record: DataRecord): Promise<void> {
+  async append(record: DataRecord): Promise<void> {
     this.records.push(record);
+    await this.change(STORE, (store) => store.add(record));
+    this.nStored += 1;
+  }
+
+  /** Returns the identity at the server of the study, if there is one. */
+  async readIdentity(): Promise<Identity | undefined> {
+    // Logs of earlier versions have no such store.
+    if (!this.database.objectStoreNames.contains(IDENTITY)) return undefined;
+    const found = await settled(this.database.transaction(IDENTITY).objectStore(IDENTITY).get(IDENTITY_KEY));
+    return found as Identity | undefined;
+  }
+
+  /** Stores the identity. */
+  setIdentity(identity: Identity): Promise<void> {
+    return this.change(IDENTITY, (store) => store.put(identity, IDENTITY_KEY));
+  }
+
+  /** Deletes all records and keeps the identity. */
+  async clear(): Promise<void> {
+    this.records.length = 0;
+    this.nStored = 0;
+    await this.change(STORE, (store) => store.clear());
+  }
+
+  private change(name: string, change: (store: IDBObjectStore) => void): Promise<void> {
     return new Promise((resolve, reject) => {
-      const transaction = this.database.transaction(STORE, "readwrite");
+      // The server must not have a record that this browser loses when its machine stops.
+      const transaction = this.database.transaction(name, "readwrite", { durability: "strict" });
       transaction.oncomplete = () => resolve();
       transaction.onabort = transaction.onerror = () => reject(transaction.error);
-      transaction.objectStore(STORE).add(record);
+      change(transaction.objectStore(name));
     });
   }
 

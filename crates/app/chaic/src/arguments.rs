@@ -52,7 +52,7 @@ pub use self::runs::{
 };
 pub use self::study::{
     StudyBuildArguments, StudyCheckArguments, StudyCommand, StudyDeleteArguments,
-    StudyExportArguments,
+    StudyExportArguments, StudyServeArguments,
 };
 pub use self::tools::{CompletionsArguments, ListCommand, ManArguments};
 

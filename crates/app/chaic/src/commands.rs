@@ -36,6 +36,7 @@ mod eval_session;
 mod recorded;
 mod run_perception;
 mod sealed;
+mod study_serve;
 mod submitted;
 mod summary;
 

@@ -81,6 +81,11 @@ pub fn study_page(title: &str, content: &serde_json::Value) -> String {
     render_with(STUDY_SCRIPT, context! { title, study })
 }
 
+/// Returns the text of the script in the page of a study, for its content security policy.
+pub fn study_script() -> String {
+    inline(STUDY_SCRIPT)
+}
+
 /// Returns the name of an episode in the list of a page.
 fn game_title(episode: &Episode) -> String {
     format!("{}: {}", episode.setup().task.info().title, episode.id())
@@ -96,11 +101,15 @@ fn render_with(script: &str, values: Value) -> String {
     let mut environment = Environment::new();
     let (name, source) = TEMPLATE;
     environment.add_template(name, source).expect("the template is valid");
-    // A closing tag in a script would end it.
-    let [worker, script] = [WORKER, script].map(|text| text.replace("</script", "<\\/script"));
+    let [worker, script] = [WORKER, script].map(inline);
     let fixed = context! { worker, script, style => STYLE, module => STANDARD.encode(MODULE) };
     let template = environment.get_template(name).expect("it was added above");
     template.render(context! { ..values, ..fixed }).expect("the template uses given values only")
+}
+
+/// Returns a script without a closing tag, which would end its element.
+fn inline(script: &str) -> String {
+    script.replace("</script", "<\\/script")
 }
 
 /// Compresses bytes (raw deflate) and encodes them as base64.

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use chaic_env::CHAIC_VERSION;
 use chaic_files::read_user_file;
 use serde::{Deserialize, Serialize};
 
@@ -97,6 +98,33 @@ pub enum DataRecord {
     Complete {},
 }
 
+impl DataRecord {
+    /// Creates the first record of a participant.
+    pub fn start(digest: &str, code: &str, slot: u32) -> DataRecord {
+        DataRecord::Start {
+            format: FORMAT.to_owned(),
+            version: VERSION,
+            chaic: CHAIC_VERSION.to_owned(),
+            study: digest.to_owned(),
+            code: code.to_owned(),
+            slot,
+        }
+    }
+
+    /// Parses a line.
+    ///
+    /// # Errors
+    /// Returns the problem.
+    pub fn parse(line: &str) -> std::result::Result<DataRecord, String> {
+        serde_json::from_str(line).map_err(|error| format!("no record: {error}"))
+    }
+
+    /// Returns the line of the record, with its end.
+    pub fn to_line(&self) -> String {
+        serde_json::to_string(self).expect("a record has string keys") + "\n"
+    }
+}
+
 /// Records of one participant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParticipantData {
@@ -116,23 +144,30 @@ impl ParticipantData {
     /// # Errors
     /// [`StudyError::Data`] with the line and the problem.
     pub fn read(path: &Path) -> Result<ParticipantData> {
+        ParticipantData::parse(&read_user_file(path, MAX_BYTES + 1)?, path)
+    }
+
+    /// Parses the content of a participant's file; `path` is for messages.
+    ///
+    /// # Errors
+    /// [`StudyError::Data`] with the line and the problem.
+    pub fn parse(bytes: &[u8], path: &Path) -> Result<ParticipantData> {
         let wrong = |line: usize, problem: String| StudyError::Data {
             path: path.to_owned(),
             line,
             problem,
         };
-        let bytes = read_user_file(path, MAX_BYTES + 1)?;
         if bytes.len() as u64 > MAX_BYTES {
             return Err(wrong(1, format!("the file is longer than {MAX_BYTES} bytes")));
         }
-        let text = std::str::from_utf8(&bytes).map_err(|e| wrong(1, format!("not UTF-8: {e}")))?;
+        let text = std::str::from_utf8(bytes).map_err(|e| wrong(1, format!("not UTF-8: {e}")))?;
         let mut records = Vec::new();
         for (line, text) in (1..).zip(text.lines()) {
             if line > MAX_RECORDS {
                 return Err(wrong(line, format!("more than {MAX_RECORDS} records")));
             }
-            let record = serde_json::from_str::<DataRecord>(text);
-            records.push((line, record.map_err(|e| wrong(line, format!("no record: {e}")))?));
+            let record = DataRecord::parse(text).map_err(|problem| wrong(line, problem))?;
+            records.push((line, record));
         }
         let mut records = records.into_iter();
         match records.next() {
@@ -148,11 +183,6 @@ impl ParticipantData {
             }
             _ => Err(wrong(1, format!("the first record must be `start` of `{FORMAT}`"))),
         }
-    }
-
-    /// Returns whether the participant has finished.
-    pub fn is_complete(&self) -> bool {
-        matches!(self.records.last(), Some((_, DataRecord::Complete {})))
     }
 }
 

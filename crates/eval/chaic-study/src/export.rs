@@ -15,6 +15,7 @@ use serde_json::json;
 use crate::data::{DataRecord, ParticipantData, TrialEnd};
 use crate::error::{Result, StudyError};
 use crate::plan::{PERSON, Plan, Trial};
+use crate::record_check::RecordCheck;
 use crate::study::Seat;
 use tables::{Tables, TrialRow};
 
@@ -146,90 +147,41 @@ impl Participation {
     /// Checks the records of a participant against the plan.
     fn new(plan: &Plan, data: ParticipantData, path: &Path) -> Result<Participation> {
         let wrong = |line: usize, problem: String| data_error(path, line, problem);
-        if data.study != plan.digest() {
-            return Err(wrong(
-                1,
-                format!(
-                    "the data are of another study: digest {}, expected {}; use the study.toml and the \
-                     version of chaic that built the page",
-                    short(&data.study),
-                    short(plan.digest())
-                ),
-            ));
-        }
-        if !(1..=plan.study().participants).contains(&data.slot) {
-            return Err(wrong(1, format!("no slot {}", data.slot)));
-        }
-        let is_complete = data.is_complete();
+        let check = RecordCheck::new(plan, &data.study, data.slot);
+        let mut check = check.map_err(|problem| wrong(1, problem))?;
         let mut participation = Participation {
             path: path.to_owned(),
             slot: data.slot,
-            is_complete,
-            trials: plan.trials(data.slot),
+            is_complete: false,
+            trials: check.trials().to_vec(),
             code: data.code,
             played: BTreeMap::new(),
             answers: Vec::new(),
         };
         for (line, record) in data.records {
-            participation.add(plan, record).map_err(|problem| wrong(line, problem))?;
+            check.add(plan, &record).map_err(|problem| wrong(line, problem))?;
+            participation.add(record);
         }
+        participation.is_complete = check.is_complete();
         Ok(participation)
     }
 
-    /// Adds a record; returns what is wrong with it.
-    fn add(&mut self, plan: &Plan, record: DataRecord) -> std::result::Result<(), String> {
+    /// Adds a checked record.
+    fn add(&mut self, record: DataRecord) {
         match record {
-            DataRecord::Start { .. } => return Err("a second `start`".to_owned()),
-            DataRecord::Instructed {} | DataRecord::Complete {} => {}
+            DataRecord::Start { .. } | DataRecord::Instructed {} | DataRecord::Complete {} => {}
             DataRecord::Trial { trial } => {
-                if trial >= self.trials.len() {
-                    return Err(format!("slot {} has no trial {trial}", self.slot));
-                }
-                if self.played.insert(trial, PlayedTrial::default()).is_some() {
-                    return Err(format!("trial {trial} begins twice"));
-                }
+                self.played.insert(trial, PlayedTrial::default());
             }
-            DataRecord::Trace { trial, text } => self.running(trial)?.trace.push_str(&text),
-            DataRecord::TrialEnd { trial, outcome } => self.running(trial)?.end = Some(outcome),
+            DataRecord::Trace { trial, text } => {
+                self.played.entry(trial).or_default().trace.push_str(&text);
+            }
+            DataRecord::TrialEnd { trial, outcome } => {
+                self.played.entry(trial).or_default().end = Some(outcome);
+            }
             DataRecord::Answers { position, form, ratings } => {
-                self.check_answers(plan, position, &form, &ratings)?;
                 self.answers.push(AnsweredForm { position, form, ratings });
             }
-        }
-        Ok(())
-    }
-
-    /// Returns the trial that has begun and not ended.
-    fn running(&mut self, trial: usize) -> std::result::Result<&mut PlayedTrial, String> {
-        let found = self.played.get_mut(&trial).filter(|played| played.end.is_none());
-        found.ok_or_else(|| format!("trial {trial} is not running"))
-    }
-
-    fn check_answers(
-        &self,
-        plan: &Plan,
-        position: u32,
-        name: &str,
-        ratings: &BTreeMap<String, Option<i32>>,
-    ) -> std::result::Result<(), String> {
-        let forms = &plan.study().forms;
-        let due = if position == 0 { &forms.at_end } else { &forms.after_condition };
-        let n_positions = self.trials.last().map_or(0, |trial| trial.position);
-        let form = plan.forms().into_iter().find(|(known, _)| *known == name);
-        let Some((_, form)) = form.filter(|_| due.iter().any(|due| due == name)) else {
-            return Err(format!("no form `{name}` is due there"));
-        };
-        let is_repeated = self.answers.iter().any(|a| a.position == position && a.form == name);
-        if position > n_positions || is_repeated {
-            return Err(format!("the form `{name}` is not due at position {position}"));
-        }
-        let items: BTreeSet<&String> = form.items.iter().map(|item| &item.id).collect();
-        if ratings.keys().collect::<BTreeSet<_>>() != items {
-            return Err(format!("the answers are not those of the form `{name}`"));
-        }
-        match ratings.values().flatten().find(|rating| !form.has_rating(**rating)) {
-            Some(rating) => Err(format!("the form `{name}` has no rating {rating}")),
-            None => Ok(()),
         }
     }
 
@@ -336,11 +288,6 @@ fn header_problem(plan: &Plan, trial: Trial, trace: &Trace) -> Option<String> {
         && header.branch_of.is_none()
         && has_person;
     (!is_same).then(|| "the trace is of another episode, seat, helper or set of rules".to_owned())
-}
-
-/// Returns the first digits of a digest.
-fn short(digest: &str) -> String {
-    digest.chars().take(8).collect()
 }
 
 /// Returns the description of the data set for `dataset_description.json`.

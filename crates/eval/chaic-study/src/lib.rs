@@ -2,9 +2,9 @@
 //!
 //! **What it is**: a [`Study`] is the content of `study.toml`. A [`Plan`] adds the conditions, the episodes
 //! and the digest, and assigns the trials of each slot. [`page_content`] is what the page of the study
-//! needs. [`ParticipantData`] is the file that a participant sends; [`export`] checks such files and writes
-//! data sets, [`deletion`] removes a participant. [`SlotTable`] and [`simulate`] are the slots of a running
-//! study and simulated participants.
+//! needs. [`ParticipantData`] is the file of a participant, whose records [`RecordCheck`] compares with the
+//! plan; [`export`] checks such files and writes data sets, [`deletion`] removes a participant. [`simulate`]
+//! gives the slots of a [`SlotTable`] to simulated participants.
 //!
 //! **What it is not**: it writes no HTML, receives no data and knows no names of participants.
 //!
@@ -20,6 +20,7 @@ mod error;
 pub mod export;
 pub mod forms;
 mod plan;
+mod record_check;
 mod simulation;
 mod slots;
 mod study;
@@ -29,6 +30,7 @@ pub use content::page_content;
 pub use data::ParticipantData;
 pub use error::{Result, StudyError};
 pub use plan::{Condition, PERSON, Plan, SEED, Trial};
+pub use record_check::RecordCheck;
 pub use simulation::{Balance, simulate};
 pub use slots::{Claim, Finish, SlotTable};
 pub use study::{

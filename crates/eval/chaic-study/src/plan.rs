@@ -24,6 +24,9 @@ const WORDS_PER_MINUTE: f64 = 200.0;
 /// Time for an item of a form in the estimated length, seconds.
 const ITEM_SECS: f64 = 6.0;
 
+/// Number of digits of a digest in messages and names.
+const SHORT_DIGITS: usize = 8;
+
 /// Problem with the keys of `study.toml`.
 type Problem = String;
 
@@ -332,4 +335,9 @@ fn digest(study: &Study, episodes: &[Episode]) -> String {
         hash.update(episode.to_json_line());
     }
     hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Returns the first digits of a digest.
+pub(crate) fn short_digest(digest: &str) -> String {
+    digest.chars().take(SHORT_DIGITS).collect()
 }

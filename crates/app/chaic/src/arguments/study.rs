@@ -1,5 +1,6 @@
 //! Options of `chaic study`.
 
+use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
@@ -13,6 +14,12 @@ pub enum StudyCommand {
     Check(StudyCheckArguments),
     /// Write the page of a study: one file that needs no network.
     Build(StudyBuildArguments),
+    /// Serve the page of a study, give out its slots and store the data of participants.
+    #[command(
+        long_about = "Serve the page of a study, give out its slots and store the data of participants, until \
+                      Ctrl-C. Needs a build with the feature `study-server`."
+    )]
+    Serve(StudyServeArguments),
     /// Check collected files and write verified traces and a Psych-DS data set.
     #[command(
         long_about = "Check collected files and write verified traces and a Psych-DS data set. The \
@@ -48,6 +55,22 @@ pub struct StudyBuildArguments {
     /// Page to write.
     #[arg(long, value_name = "FILE", default_value = "study.html")]
     pub out: PathBuf,
+}
+
+/// `chaic study serve`.
+#[derive(Args, Debug)]
+pub struct StudyServeArguments {
+    /// Definition of the study.
+    pub study: PathBuf,
+    /// Folder of the participants' files, which is created if it is missing.
+    #[arg(long, value_name = "DIR")]
+    pub data: PathBuf,
+    /// Address and port; port 0 selects a free one.
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:8040")]
+    pub listen: SocketAddr,
+    /// Name under which browsers reach the server, such as study.example.org; repeat it for several.
+    #[arg(long = "host", value_name = "NAME")]
+    pub hosts: Vec<String>,
 }
 
 /// `chaic study export`.

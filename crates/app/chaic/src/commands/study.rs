@@ -30,6 +30,7 @@ const MAX_LISTED: usize = 20;
 /// Runs a command for studies.
 pub fn run(command: &StudyCommand, format: OutputFormat) -> Result<ExitStatus> {
     match command {
+        StudyCommand::Serve(arguments) => super::study_serve::run(arguments, format),
         StudyCommand::Check(arguments) => check(arguments, format),
         StudyCommand::Build(arguments) => build(arguments, format),
         StudyCommand::Export(arguments) => export_data(arguments, format),

@@ -95,3 +95,29 @@ fn collected_files_are_exported_and_deleted() {
     assert!(refused.contains("any name.jsonl, line 1: no record"), "{refused}");
     assert_eq!(refused.lines().count(), 1, "{refused}");
 }
+
+/// The server itself has tests in `chaic-study-server` and, with the page, in `web`.
+#[test]
+fn a_study_is_served_if_the_build_has_the_server() {
+    let dir = tempfile::tempdir().expect("the disk has space");
+    let at = dir.path();
+    write_study(at);
+    let serve = ["study", "serve", "study.toml", "--data", "data"];
+    if !cfg!(feature = "study-server") {
+        assert!(run_err(at, &serve).contains("--features study-server"));
+        return;
+    }
+    for (options, words) in [
+        (["--listen", "0.0.0.0:0"], "add --host NAME"),
+        (["--host", "https://study.example.org"], "is no name of a server"),
+    ] {
+        let refused = run_err(at, &[&serve[..], &options].concat());
+        assert!(refused.contains(words), "{refused}");
+        assert_eq!(refused.lines().count(), 1, "{refused}");
+    }
+    fs::create_dir_all(at.join("data")).expect("the disk has space");
+    fs::write(at.join(format!("data/{CODE}.jsonl")), "{}\n").expect("the disk has space");
+    let refused = run_err(at, &[&serve[..], &["--listen", "127.0.0.1:0"]].concat());
+    assert!(refused.contains(&format!("{CODE}.jsonl, line 1: no record")), "{refused}");
+    assert_eq!(refused.lines().count(), 1, "{refused}");
+}

@@ -6,11 +6,11 @@ use std::path::Path;
 
 use chaic_files::{create_folders, write_atomically};
 
-use super::{CheckedTrace, description, short};
+use super::{CheckedTrace, description};
 use crate::data::TrialEnd;
 use crate::error::Result;
 use crate::forms::Form;
-use crate::plan::{Plan, Trial};
+use crate::plan::{Plan, Trial, short_digest};
 
 /// Columns of the rows of all tables.
 const COMMON: [(&str, &str); 4] = [
@@ -169,7 +169,7 @@ impl Tables {
         let tables =
             [("answers", &self.answers), ("scores", &self.scores), ("trials", &self.trials)];
         for (name, table) in tables {
-            let file = format!("study-{}_description-{name}_data.csv", short(plan.digest()));
+            let file = format!("study-{}_description-{name}_data.csv", short_digest(plan.digest()));
             write_atomically(&folder.join(file), table.as_bytes())?;
         }
         let mut variables: Vec<(String, &'static str)> = Vec::new();

@@ -31,6 +31,20 @@ pub(super) const EXAMPLES: &[CommandExamples] = &[
         ],
     ),
     (
+        "chaic study serve",
+        [
+            ("Serve a study on this computer", "chaic study serve study.toml --data data"),
+            (
+                "Serve it behind a proxy with TLS",
+                "chaic study serve study.toml --data data --host study.example.org",
+            ),
+            (
+                "Serve it in the network of a laboratory",
+                "chaic study serve study.toml --data data --listen 192.168.0.10:8040",
+            ),
+        ],
+    ),
+    (
         "chaic study export",
         [
             ("Export a folder", "chaic study export data --study study.toml --out set"),

@@ -1,0 +1,216 @@
+//! The file of one participant: appends that are checked, synchronized and repeatable.
+//!
+//! Each append is one write, which is synchronized (`fdatasync`) before the request is answered.
+
+use std::fs;
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use chaic_files::{
+    EntryKind, FileError, kind, open_for_append, read_bounded, remove_file, write_new_private,
+};
+use chaic_study::data::DataRecord;
+use chaic_study::{ParticipantData, Plan, RecordCheck};
+
+use crate::access::TokenDigest;
+use crate::error::{Result, ServerError};
+use crate::limits::{MAX_FILE_BYTES, MAX_RECORDS, PARTICIPANT_RATE};
+use crate::refusal::Refusal;
+use crate::token_bucket::TokenBucket;
+
+/// Ending of files with the digest of a token. An export does not read them.
+const TOKEN_ENDING: &str = "token";
+
+/// Returns the path of the token of the participant with this file.
+pub fn token_path(path: &Path) -> PathBuf {
+    path.with_extension(TOKEN_ENDING)
+}
+
+/// File of a participant.
+pub struct Log {
+    path: PathBuf,
+    check: RecordCheck,
+    n_records: usize,
+    n_bytes: usize,
+    /// True after a failed write, which may have left bytes behind.
+    is_torn: bool,
+    bucket: TokenBucket,
+}
+
+impl Log {
+    /// Creates the file with its first line, after that of the token.
+    pub fn create(
+        path: PathBuf,
+        check: RecordCheck,
+        token: &TokenDigest,
+        start: &str,
+        now_secs: u64,
+    ) -> std::result::Result<Log, Refusal> {
+        let token_path = token_path(&path);
+        remove_if_present(&token_path)?;
+        write_new_private(&token_path, token.to_line().as_bytes())?;
+        if let Err(error) = write_new_private(&path, start.as_bytes()) {
+            // If the removal fails too, the next start of the server removes it.
+            let _ = remove_file(&token_path);
+            return Err(error.into());
+        }
+        let bucket = TokenBucket::new(PARTICIPANT_RATE, now_secs);
+        Ok(Log { path, check, n_records: 1, n_bytes: start.len(), is_torn: false, bucket })
+    }
+
+    /// Reads the file of a participant, without an incomplete last line, and removes that line. Returns the slot
+    /// too.
+    pub fn read(plan: &Plan, code: &str, path: &Path, now_secs: u64) -> Result<(Log, u32)> {
+        let wrong = |line: usize, problem: String| ServerError::Data {
+            path: path.to_owned(),
+            line,
+            problem,
+        };
+        let mut bytes = read_bounded(path, MAX_FILE_BYTES as u64 + 1)?;
+        if bytes.len() > MAX_FILE_BYTES {
+            return Err(wrong(1, format!("the file is longer than {MAX_FILE_BYTES} bytes")));
+        }
+        let n_bytes = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |k| k + 1);
+        let is_torn = n_bytes < bytes.len();
+        bytes.truncate(n_bytes);
+        let data = ParticipantData::parse(&bytes, path)?;
+        if data.code != code {
+            return Err(wrong(1, format!("the code is {}; rename the file", data.code)));
+        }
+        let check = RecordCheck::new(plan, &data.study, data.slot);
+        let mut check = check.map_err(|problem| wrong(1, problem))?;
+        for (line, record) in &data.records {
+            check.add(plan, record).map_err(|problem| wrong(*line, problem))?;
+        }
+        if is_torn {
+            let file = open_for_append(path)?;
+            let shortened = file.set_len(n_bytes as u64).and_then(|()| file.sync_all());
+            shortened.map_err(FileError::context("shorten", path))?;
+        }
+        let bucket = TokenBucket::new(PARTICIPANT_RATE, now_secs);
+        let n_records = data.records.len() + 1;
+        let log = Log { path: path.to_owned(), check, n_records, n_bytes, is_torn: false, bucket };
+        Ok((log, data.slot))
+    }
+
+    /// Returns the number of stored records.
+    pub fn n_records(&self) -> usize {
+        self.n_records
+    }
+
+    /// Returns whether the participant has finished.
+    pub fn is_complete(&self) -> bool {
+        self.check.is_complete()
+    }
+
+    /// Counts a request against the rate of the participant.
+    pub fn take_token(&mut self, now_secs: u64) -> std::result::Result<(), Refusal> {
+        if self.bucket.take(now_secs) { Ok(()) } else { Err(Refusal::Rate) }
+    }
+
+    /// Returns the first line.
+    pub fn first_line(&self) -> std::result::Result<String, Refusal> {
+        let text = self.read_stored()?;
+        text.split_inclusive('\n').next().map(str::to_owned).ok_or(Refusal::Changed)
+    }
+
+    /// Appends lines of records, the first of which has the number `from`, and compares those that are stored.
+    pub fn append(
+        &mut self,
+        plan: &Plan,
+        from: usize,
+        text: &str,
+    ) -> std::result::Result<(), Refusal> {
+        if from > self.n_records {
+            return Err(Refusal::Gap { stored: self.n_records });
+        }
+        let lines: Vec<&str> = text.split_inclusive('\n').collect();
+        let wrong = |k: usize, problem: &str| Refusal::Record {
+            number: from + k,
+            problem: problem.to_owned(),
+        };
+        if let Some(k) = lines.iter().position(|line| !line.ends_with('\n')) {
+            return Err(wrong(k, "the line has no end"));
+        }
+        let n_stored = (self.n_records - from).min(lines.len());
+        let (stored, new) = lines.split_at(n_stored);
+        if !stored.is_empty() {
+            let known = self.read_stored()?;
+            let known = known.split_inclusive('\n').skip(from);
+            if let Some(k) = known.zip(stored).position(|(known, sent)| known != *sent) {
+                return Err(wrong(k, "another record is stored"));
+            }
+        }
+        if new.is_empty() {
+            return Ok(());
+        }
+        if self.n_records + new.len() > MAX_RECORDS {
+            return Err(Refusal::Size(format!("{MAX_RECORDS} records")));
+        }
+        let bytes = new.concat();
+        if self.n_bytes + bytes.len() > MAX_FILE_BYTES {
+            return Err(Refusal::Size(format!("{} MiB", MAX_FILE_BYTES >> 20)));
+        }
+        let mut check = self.check.clone();
+        for (k, line) in new.iter().enumerate() {
+            let record = DataRecord::parse(line).and_then(|record| check.add(plan, &record));
+            record.map_err(|problem| wrong(n_stored + k, &problem))?;
+        }
+        self.write(bytes.as_bytes())?;
+        self.check = check;
+        self.n_records += new.len();
+        self.n_bytes += bytes.len();
+        Ok(())
+    }
+
+    /// Removes the file and the token.
+    pub fn delete(&mut self) -> std::result::Result<(), Refusal> {
+        remove_if_present(&self.path)?;
+        remove_if_present(&token_path(&self.path))?;
+        Ok(())
+    }
+
+    /// Reads the stored lines.
+    fn read_stored(&self) -> std::result::Result<String, Refusal> {
+        self.check_present()?;
+        let bytes = read_bounded(&self.path, self.n_bytes as u64)?;
+        String::from_utf8(bytes).map_err(|_| Refusal::Changed)
+    }
+
+    fn check_present(&self) -> std::result::Result<(), Refusal> {
+        match kind(&self.path)? {
+            EntryKind::Missing => Err(Refusal::Unknown),
+            _ => Ok(()),
+        }
+    }
+
+    /// Appends bytes, synchronized; after a failure the file is as before, or shortened at the next write.
+    fn write(&mut self, bytes: &[u8]) -> std::result::Result<(), Refusal> {
+        self.check_present()?;
+        let mut file = open_for_append(&self.path)?;
+        let metadata = fs::metadata(&self.path);
+        let length = metadata.map_err(FileError::context("read the size of", &self.path))?.len();
+        let expected = self.n_bytes as u64;
+        if length != expected && !self.is_torn {
+            return Err(Refusal::Changed);
+        }
+        let mut write = || -> io::Result<()> {
+            if length != expected {
+                file.set_len(expected)?;
+            }
+            file.write_all(bytes)?;
+            file.sync_data()
+        };
+        let written = write();
+        self.is_torn = written.is_err();
+        if written.is_err() {
+            // If this fails too, the next write shortens the file.
+            let _ = file.set_len(expected);
+        }
+        Ok(written.map_err(FileError::context("write", &self.path))?)
+    }
+}
+
+fn remove_if_present(path: &Path) -> chaic_files::Result<()> {
+    if kind(path)? == EntryKind::Missing { Ok(()) } else { remove_file(path) }
+}

@@ -1,0 +1,243 @@
+//! Routes of the server, with the checks of every request.
+//!
+//! | request | effect |
+//! |---|---|
+//! | `GET /` | the page |
+//! | `PUT /participants/CODE` | gives a slot; answers with the first record and the number of stored ones |
+//! | `GET /participants/CODE` | answers with the number of stored records |
+//! | `DELETE /participants/CODE` | deletes the participant |
+//! | `PUT /participants/CODE/records/N` | appends records, the first of which has the number N |
+//!
+//! Requests for participants have a token. Every request can be repeated.
+
+use std::sync::Arc;
+
+use axum::Router;
+use axum::body::{Body, Bytes, HttpBody as _, to_bytes};
+use axum::extract::{Path, Request, State};
+use axum::http::header::{self, HeaderName, HeaderValue};
+use axum::http::{HeaderMap, Method, StatusCode};
+use axum::middleware::{Next, from_fn_with_state};
+use axum::response::{IntoResponse as _, Response};
+use axum::routing::{get, put};
+use chaic_study::data::is_code;
+use serde_json::json;
+use tokio::task::spawn_blocking;
+use tokio::time::timeout;
+
+use crate::access::{AllowedHosts, TokenDigest};
+use crate::limits::{MAX_BODY_BYTES, REQUEST_TIMEOUT};
+use crate::refusal::Refusal;
+use crate::store::{Entered, Store};
+
+/// Clock of the server, seconds from any start. Data contain no time.
+pub type Clock = Box<dyn Fn() -> u64 + Send + Sync>;
+/// Receiver of problems that the researcher should see.
+pub type Reporter = Box<dyn Fn(&str) + Send + Sync>;
+
+/// State of the routes.
+pub struct App {
+    /// Participants.
+    pub store: Store,
+    /// Names of the server.
+    pub hosts: AllowedHosts,
+    /// The page (HTML).
+    pub page: Bytes,
+    /// Content security policy of the page.
+    pub policy: HeaderValue,
+    /// Clock.
+    pub clock: Clock,
+    /// Receiver of problems.
+    pub report: Reporter,
+}
+
+/// Headers of all answers, beside the policy.
+const HEADERS: [(HeaderName, &str); 5] = [
+    (header::CACHE_CONTROL, "no-store"),
+    (header::REFERRER_POLICY, "no-referrer"),
+    (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+    (HeaderName::from_static("cross-origin-opener-policy"), "same-origin"),
+    (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
+];
+
+/// Creates the routes.
+pub fn router(app: Arc<App>) -> Router {
+    Router::new()
+        .route("/", get(page))
+        .route("/participants/{code}", put(enter).get(stored).delete(withdraw))
+        .route("/participants/{code}/records/{from}", put(append))
+        .fallback(async || refuse(StatusCode::NOT_FOUND, "there is no such page"))
+        .method_not_allowed_fallback(async || {
+            refuse(StatusCode::METHOD_NOT_ALLOWED, "the page has no such method")
+        })
+        .layer(from_fn_with_state(Arc::clone(&app), guard))
+        .with_state(app)
+}
+
+/// Checks host and origin, limits the duration, and adds the headers.
+async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
+    let is_reading = matches!(*request.method(), Method::GET | Method::HEAD);
+    let headers = request.headers();
+    let mut response = if !app.hosts.has_host(headers) || request.uri().authority().is_some() {
+        let text = "the server is not known under this name; its operator can add --host NAME";
+        refuse(StatusCode::FORBIDDEN, text)
+    } else if !is_reading && !app.hosts.has_origin(headers) {
+        refuse(StatusCode::FORBIDDEN, "the request does not come from the page of this server")
+    } else {
+        timeout(REQUEST_TIMEOUT, next.run(request)).await.unwrap_or_else(|_| {
+            refuse(StatusCode::REQUEST_TIMEOUT, "the request took too long; repeat it")
+        })
+    };
+    let headers = response.headers_mut();
+    for (name, value) in HEADERS {
+        headers.insert(name, HeaderValue::from_static(value));
+    }
+    headers.insert(header::CONTENT_SECURITY_POLICY, app.policy.clone());
+    response
+}
+
+async fn page(State(app): State<Arc<App>>) -> Response {
+    let html = HeaderValue::from_static("text/html; charset=utf-8");
+    ([(header::CONTENT_TYPE, html)], app.page.clone()).into_response()
+}
+
+async fn enter(
+    State(app): State<Arc<App>>,
+    Path(code): Path<String>,
+    headers: HeaderMap,
+) -> Response {
+    respond(app, code, &headers, StatusCode::CREATED, |app, code, token| {
+        let Entered { start, stored } = app.store.enter(code, token, (app.clock)())?;
+        // The line as it is: a parsed one would lose the order of its keys.
+        Ok(format!("{{\"start\":{},\"stored\":{stored}}}", start.trim_end()))
+    })
+    .await
+}
+
+async fn stored(
+    State(app): State<Arc<App>>,
+    Path(code): Path<String>,
+    headers: HeaderMap,
+) -> Response {
+    respond(app, code, &headers, StatusCode::OK, |app, code, token| {
+        Ok(stored_json(app.store.stored(code, token, (app.clock)())?))
+    })
+    .await
+}
+
+async fn withdraw(
+    State(app): State<Arc<App>>,
+    Path(code): Path<String>,
+    headers: HeaderMap,
+) -> Response {
+    respond(app, code, &headers, StatusCode::OK, |app, code, token| {
+        app.store.withdraw(code, token)?;
+        Ok(stored_json(0))
+    })
+    .await
+}
+
+async fn append(
+    State(app): State<Arc<App>>,
+    Path((code, from)): Path<(String, String)>,
+    request: Request,
+) -> Response {
+    let (parts, body) = request.into_parts();
+    let is_number = !from.is_empty() && from.bytes().all(|byte| byte.is_ascii_digit());
+    let Some(from) = from.parse::<usize>().ok().filter(|_| is_number) else {
+        return refuse(StatusCode::NOT_FOUND, "there is no such page");
+    };
+    // The sender is known before the body is read.
+    let token = TokenDigest::of_request(&parts.headers);
+    if let Err(refusal) =
+        token.ok_or(Refusal::Token).and_then(|token| app.store.authorize(&code, &token))
+    {
+        return refusal_response(&app, &refusal);
+    }
+    let text = match read_text(body).await {
+        Ok(text) => text,
+        Err(response) => return response,
+    };
+    respond(app, code, &parts.headers, StatusCode::OK, move |app, code, token| {
+        Ok(stored_json(app.store.append(code, token, from, &text, (app.clock)())?))
+    })
+    .await
+}
+
+/// Reads a body of limited size.
+async fn read_text(body: Body) -> Result<String, Response> {
+    let refused = || {
+        let text = format!("the request is incomplete or longer than {MAX_BODY_BYTES} bytes");
+        refuse(StatusCode::PAYLOAD_TOO_LARGE, &text)
+    };
+    // A length in the headers is compared before anything is read.
+    if body.size_hint().lower() > MAX_BODY_BYTES as u64 {
+        return Err(refused());
+    }
+    let bytes = to_bytes(body, MAX_BODY_BYTES).await.map_err(|_| refused())?;
+    String::from_utf8(bytes.into())
+        .map_err(|_| refuse(StatusCode::UNPROCESSABLE_ENTITY, "the records are not UTF-8"))
+}
+
+/// Performs a request of a participant on a thread for files.
+async fn respond(
+    app: Arc<App>,
+    code: String,
+    headers: &HeaderMap,
+    success: StatusCode,
+    perform: impl FnOnce(&App, &str, &TokenDigest) -> Result<String, Refusal> + Send + 'static,
+) -> Response {
+    if !is_code(&code) {
+        return refuse(StatusCode::NOT_FOUND, "there is no such page");
+    }
+    let Some(token) = TokenDigest::of_request(headers) else {
+        return refusal_response(&app, &Refusal::Token);
+    };
+    let shared = Arc::clone(&app);
+    match spawn_blocking(move || perform(&shared, &code, &token)).await {
+        Ok(Ok(answer)) => json_response(success, answer),
+        Ok(Err(refusal)) => refusal_response(&app, &refusal),
+        Err(_) => {
+            (app.report)("a request of a participant has failed; this is an error of chaic");
+            refuse(StatusCode::INTERNAL_SERVER_ERROR, "the server has failed")
+        }
+    }
+}
+
+/// Answers with a refusal, and reports those that the researcher can remedy.
+fn refusal_response(app: &App, refusal: &Refusal) -> Response {
+    let status = match refusal {
+        Refusal::Unknown => StatusCode::NOT_FOUND,
+        Refusal::Token => StatusCode::UNAUTHORIZED,
+        Refusal::Full => StatusCode::GONE,
+        Refusal::Rate => StatusCode::TOO_MANY_REQUESTS,
+        Refusal::Gap { .. } => StatusCode::CONFLICT,
+        Refusal::Record { .. } => StatusCode::UNPROCESSABLE_ENTITY,
+        Refusal::Size(_) => StatusCode::PAYLOAD_TOO_LARGE,
+        Refusal::Changed | Refusal::File(_) => StatusCode::INTERNAL_SERVER_ERROR,
+    };
+    match refusal {
+        Refusal::File(error) => (app.report)(&error.to_string()),
+        Refusal::Changed => (app.report)(&refusal.to_string()),
+        _ => {}
+    }
+    let mut answer = json!({ "error": refusal.to_string() });
+    if let Refusal::Gap { stored } = refusal {
+        answer["stored"] = json!(stored);
+    }
+    json_response(status, answer.to_string())
+}
+
+/// Answers with an error.
+fn refuse(status: StatusCode, text: &str) -> Response {
+    json_response(status, json!({ "error": text }).to_string())
+}
+
+fn stored_json(stored: usize) -> String {
+    json!({ "stored": stored }).to_string()
+}
+
+fn json_response(status: StatusCode, answer: String) -> Response {
+    let media_type = HeaderValue::from_static("application/json");
+    (status, [(header::CONTENT_TYPE, media_type)], answer).into_response()
+}

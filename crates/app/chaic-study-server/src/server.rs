@@ -1,0 +1,179 @@
+//! The server: listens, bounds its connections, and ends when a flag is set.
+
+use std::io;
+use std::net::{SocketAddr, TcpListener};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use axum::Router;
+use axum::http::HeaderValue;
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use chaic_page::{study_page, study_script};
+use chaic_study::{Plan, page_content};
+use hyper::server::conn::http1;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::server::graceful::GracefulShutdown;
+use hyper_util::service::TowerToHyperService;
+use serde_json::json;
+use sha2::{Digest as _, Sha256};
+use tokio::runtime::{Builder, Runtime};
+use tokio::sync::Semaphore;
+use tokio::time::{sleep, timeout};
+
+use crate::access::{AllowedHosts, is_host_name};
+use crate::error::{Result, ServerError};
+use crate::limits::{
+    HEADER_TIMEOUT, MAX_CONNECTIONS, MAX_HEADER_BYTES, STOP_TIMEOUT, WRITER_THREADS,
+};
+use crate::routes::{App, Clock, Reporter, router};
+use crate::store::{Counts, Store};
+
+/// Threads that handle requests.
+const THREADS: usize = 2;
+/// Interval at which the flag is read that ends the server.
+const STOP_INTERVAL: Duration = Duration::from_millis(50);
+/// Pause after a connection that the system refused, for example without free descriptors.
+const ACCEPT_PAUSE: Duration = Duration::from_millis(50);
+
+/// Options of a server.
+#[derive(Clone, Debug)]
+pub struct ServerOptions {
+    /// Folder of the participants' files.
+    pub folder: PathBuf,
+    /// Address on which to listen. Port 0 selects a free one.
+    pub listen: SocketAddr,
+    /// Further names under which browsers reach the server.
+    pub hosts: Vec<String>,
+}
+
+/// Server of a study.
+pub struct StudyServer {
+    runtime: Runtime,
+    listener: TcpListener,
+    address: SocketAddr,
+    app: Arc<App>,
+}
+
+impl StudyServer {
+    /// Opens the folder of the data, builds the page and listens. Requests are answered by [`StudyServer::run`].
+    ///
+    /// # Errors
+    /// [`ServerError`].
+    pub fn open(
+        plan: Plan,
+        options: &ServerOptions,
+        clock: Clock,
+        report: Reporter,
+    ) -> Result<StudyServer> {
+        let ServerOptions { folder, listen, hosts } = options;
+        if let Some(name) = hosts.iter().find(|name| !is_host_name(name)) {
+            return Err(ServerError::HostName(name.clone()));
+        }
+        if listen.ip().is_unspecified() && hosts.is_empty() {
+            return Err(ServerError::NoHostName(*listen));
+        }
+        let refused = |error| ServerError::Listen { address: *listen, error };
+        let runtime = Builder::new_multi_thread()
+            .worker_threads(THREADS)
+            .max_blocking_threads(WRITER_THREADS)
+            .enable_all()
+            .build()
+            .map_err(refused)?;
+        let listener = listen_on(*listen).map_err(refused)?;
+        let address = listener.local_addr().map_err(refused)?;
+        let mut content = page_content(&plan);
+        content["server"] = json!(true);
+        let page = study_page(&plan.study().title, &content);
+        let store = Store::open(plan, folder, clock())?;
+        let hosts = AllowedHosts::new(address, hosts);
+        let app =
+            Arc::new(App { store, hosts, page: page.into(), policy: policy(), clock, report });
+        Ok(StudyServer { runtime, listener, address, app })
+    }
+
+    /// Returns the address on which the server listens.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Returns the number of participants with files.
+    pub fn counts(&self) -> Counts {
+        self.app.store.counts()
+    }
+
+    /// Answers requests until the flag is set. Requests in progress are finished first.
+    ///
+    /// # Errors
+    /// [`ServerError::Listen`].
+    pub fn run(self, stop: &AtomicBool) -> Result<Counts> {
+        let StudyServer { runtime, listener, address, app } = self;
+        let listener = {
+            let _runtime = runtime.enter();
+            tokio::net::TcpListener::from_std(listener)
+        };
+        let listener = listener.map_err(|error| ServerError::Listen { address, error })?;
+        runtime.block_on(serve(listener, router(Arc::clone(&app)), stop));
+        // Waits for writes in progress.
+        drop(runtime);
+        Ok(app.store.counts())
+    }
+}
+
+fn listen_on(address: SocketAddr) -> io::Result<TcpListener> {
+    let listener = TcpListener::bind(address)?;
+    listener.set_nonblocking(true)?;
+    Ok(listener)
+}
+
+/// Accepts connections until the flag is set, and then waits for those with requests in progress.
+async fn serve(listener: tokio::net::TcpListener, router: Router, stop: &AtomicBool) {
+    let free = Arc::new(Semaphore::new(MAX_CONNECTIONS));
+    let connections = GracefulShutdown::new();
+    let mut http = http1::Builder::new();
+    http.timer(TokioTimer::new())
+        .header_read_timeout(HEADER_TIMEOUT)
+        .max_buf_size(MAX_HEADER_BYTES);
+    let stopped = async {
+        while !stop.load(Ordering::SeqCst) {
+            sleep(STOP_INTERVAL).await;
+        }
+    };
+    tokio::pin!(stopped);
+    loop {
+        let accepted = async {
+            let permit = Arc::clone(&free).acquire_owned().await.expect("it is never closed");
+            (permit, listener.accept().await)
+        };
+        let (permit, accepted) = tokio::select! {
+            () = &mut stopped => break,
+            accepted = accepted => accepted,
+        };
+        let Ok((stream, _)) = accepted else {
+            sleep(ACCEPT_PAUSE).await;
+            continue;
+        };
+        let service = TowerToHyperService::new(router.clone());
+        let connection = connections.watch(http.serve_connection(TokioIo::new(stream), service));
+        tokio::spawn(async move {
+            // A broken connection concerns its client alone, who repeats the request.
+            let _ = connection.await;
+            drop(permit);
+        });
+    }
+    drop(listener);
+    let _ = timeout(STOP_TIMEOUT, connections.shutdown()).await;
+}
+
+/// Returns the policy of the page: its own script, module and worker, and requests to this server alone.
+fn policy() -> HeaderValue {
+    let hash = STANDARD.encode(Sha256::digest(study_script()));
+    let text = format!(
+        "default-src 'none'; script-src 'sha256-{hash}' 'wasm-unsafe-eval' blob:; worker-src blob:; \
+         style-src 'unsafe-inline'; img-src data: blob:; connect-src 'self'; base-uri 'none'; \
+         form-action 'none'; frame-ancestors 'none'"
+    );
+    HeaderValue::from_str(&text).expect("base64 is ASCII")
+}

@@ -250,8 +250,8 @@ impl Env {
 
     /// Renders the color image of an agent: RGB, u8, shape [height, width, 3].
     ///
-    /// It is for learners that need color at few observations. Their sensors have none, which saves most
-    /// of the time of an observation.
+    /// It is for learners that need color at few observations. Their sensors have none, so the other
+    /// observations are drawn without it.
     pub fn render_color(&self, agent: AgentId) -> Vec<u8> {
         let image_size = self.slots[agent.index()].sensors.image_size;
         self.renderer.render_color(&self.world, agent, image_size)

@@ -10,13 +10,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use chaic_study::data::CODE_ALPHABET;
 use chaic_study::{Plan, Study};
 use chaic_study_server::{ServerOptions, StudyServer};
 use rustix::time::{ClockId, clock_gettime};
 
 /// Size of the trace of a decision, bytes: the mean of a game by plans, rounded up.
 const DECISION_BYTES: usize = 2000;
-const ALPHABET: &[u8] = b"ABCDEFGHJKLMNPQRSTUVWXYZ23456789";
 
 const DEFINITION: &str = r#"title = "Load"
 consent = "text.txt"
@@ -85,8 +85,8 @@ fn main() {
 fn play(address: SocketAddr, n: usize, n_players: usize, n_seconds: usize) -> Player {
     // Players do not act at the same moment.
     thread::sleep(Duration::from_secs(1).mul_f64(n as f64 / n_players as f64));
-    let letter = |k: usize| char::from(ALPHABET[k % ALPHABET.len()]);
-    let code = format!("LQADTEST{}{}", letter(n / ALPHABET.len()), letter(n));
+    let letter = |k: usize| char::from(CODE_ALPHABET[k % CODE_ALPHABET.len()]);
+    let code = format!("LQADTEST{}{}", letter(n / CODE_ALPHABET.len()), letter(n));
     let mut connection = BufReader::new(TcpStream::connect(address).expect("it listens"));
     connection.get_ref().set_nodelay(true).expect("a socket");
     let mut request = |method: &str, path: &str, body: &str| {

@@ -1,4 +1,4 @@
-//! Routes of the server, with the checks of every request.
+//! HTTP routes of the server. A guard checks every request first.
 //!
 //! | request | effect |
 //! |---|---|

@@ -10,7 +10,7 @@ use chaic_files::{
     remove_file,
 };
 use chaic_study::data::{DataRecord, is_code};
-use chaic_study::{Plan, RecordCheck};
+use chaic_study::{Plan, RecordCheck, SlotHolder, lowest_free_slot};
 
 use crate::access::TokenDigest;
 use crate::error::{Result, ServerError};
@@ -26,8 +26,8 @@ const SECS_PER_MINUTE: u64 = 60;
 
 /// Participants of a study in a folder, which is locked.
 ///
-/// Slots follow from the files: a slot is done if a participant with it has finished, and taken until the
-/// time-out of its last participant. A server that starts again counts the time-outs from its start.
+/// Slots follow from the files ([`lowest_free_slot`]). A server that starts again counts the time-outs from its
+/// start.
 /// `chaic_study::SlotTable` has claims instead, which the files do not have.
 pub struct Store {
     plan: Plan,
@@ -245,20 +245,16 @@ impl Store {
         now_secs: u64,
     ) -> Option<u32> {
         let study = self.plan.study();
-        let n_slots = study.participants as usize;
-        if by_code.len() >= n_slots * PARTICIPANTS_PER_SLOT {
+        if by_code.len() >= study.participants as usize * PARTICIPANTS_PER_SLOT {
             return None;
         }
         let timeout_secs = u64::from(study.timeout_minutes) * SECS_PER_MINUTE;
-        let mut is_taken = vec![false; n_slots];
-        for participant in by_code.values() {
-            let is_present = now_secs.saturating_sub(participant.since_secs) < timeout_secs;
-            if is_present || participant.is_complete.load(Ordering::Relaxed) {
-                is_taken[participant.slot as usize - 1] = true;
-            }
-        }
-        let free = is_taken.iter().position(|is_taken| !is_taken);
-        free.map(|k| k as u32 + 1)
+        let holders = by_code.values().map(|participant| SlotHolder {
+            slot: participant.slot,
+            since_secs: participant.since_secs,
+            is_complete: participant.is_complete.load(Ordering::Relaxed),
+        });
+        lowest_free_slot(study.participants, timeout_secs, now_secs, holders)
     }
 }
 

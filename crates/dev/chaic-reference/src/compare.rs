@@ -32,7 +32,7 @@ impl<'a> Comparison<'a> {
         Comparison { facts: Facts::new(setup, set), states, n_open: 0 }
     }
 
-    /// Tells the reference that people were moved between two frames.
+    /// Takes over the poses of people that were moved between two frames.
     pub(crate) fn move_people(&mut self, world: &World) {
         for state in &mut self.states {
             state.scene = Scene::of(world);

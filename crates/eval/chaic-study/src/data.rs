@@ -18,7 +18,7 @@ const MAX_BYTES: u64 = 64 << 20;
 /// Maximum number of records: more than the decisions of a day.
 const MAX_RECORDS: usize = 500_000;
 /// Letters and digits of participant codes: those that are not mistaken for each other.
-const ALPHABET: &[u8] = b"ABCDEFGHJKLMNPQRSTUVWXYZ23456789";
+pub const CODE_ALPHABET: &[u8] = b"ABCDEFGHJKLMNPQRSTUVWXYZ23456789";
 /// Number of characters of a participant code.
 const CODE_LENGTH: usize = 10;
 
@@ -188,5 +188,5 @@ impl ParticipantData {
 
 /// Returns whether a text is a participant code.
 pub fn is_code(text: &str) -> bool {
-    text.len() == CODE_LENGTH && text.bytes().all(|byte| ALPHABET.contains(&byte))
+    text.len() == CODE_LENGTH && text.bytes().all(|byte| CODE_ALPHABET.contains(&byte))
 }

@@ -3,8 +3,8 @@
 //! **What it is**: a [`Study`] is the content of `study.toml`. A [`Plan`] adds the conditions, the episodes
 //! and the digest, and assigns the trials of each slot. [`page_content`] is what the page of the study
 //! needs. [`ParticipantData`] is the file of a participant, whose records [`RecordCheck`] compares with the
-//! plan; [`export`] checks such files and writes data sets, [`deletion`] removes a participant. [`simulate`]
-//! gives the slots of a [`SlotTable`] to simulated participants.
+//! plan; [`export`] checks such files and writes data sets, [`deletion`] removes a participant.
+//! [`lowest_free_slot`] is the slot of the next participant, and [`simulate`] a study with simulated ones.
 //!
 //! **What it is not**: it writes no HTML, receives no data and knows no names of participants.
 //!
@@ -32,7 +32,7 @@ pub use error::{Result, StudyError};
 pub use plan::{Condition, PERSON, Plan, SEED, Trial};
 pub use record_check::RecordCheck;
 pub use simulation::{Balance, simulate};
-pub use slots::{Claim, Finish, SlotTable};
+pub use slots::{SlotHolder, lowest_free_slot};
 pub use study::{
     Design, Factors, FormPlan, Input, MAX_PARTICIPANTS, PlaySettings, Seat, Study, WorldPace,
 };

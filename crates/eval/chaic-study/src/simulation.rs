@@ -1,11 +1,11 @@
 //! Simulated participants with drop-outs, and the balance of the design after them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use chaic_core::rng::RngStream;
 
 use crate::plan::Plan;
-use crate::slots::{Claim, Finish, SlotTable};
+use crate::slots::{SlotHolder, lowest_free_slot};
 
 /// Longest time between the arrivals of two participants, seconds.
 const MAX_ARRIVAL_SECS: f32 = 600.0;
@@ -19,7 +19,7 @@ const SECS_PER_MINUTE: f64 = 60.0;
 pub struct Balance {
     /// Number of participants who arrived.
     pub arrived: u32,
-    /// Number of participants who finished in time.
+    /// Number of finished slots.
     pub completed: u32,
     /// Number of participants who finished after their slot had been given away.
     pub late: u32,
@@ -43,9 +43,10 @@ impl Balance {
     }
 }
 
-/// A participant who is present.
+/// A simulated participant.
+#[derive(Clone, Copy)]
 struct Participant {
-    claim: Claim,
+    holder: SlotHolder,
     leaves_secs: u64,
     finishes: bool,
 }
@@ -55,41 +56,48 @@ struct Participant {
 pub fn simulate(plan: &Plan, n_participants: u32, dropout: f64) -> Balance {
     let timeout_secs = u64::from(plan.study().timeout_minutes) * 60;
     let length_secs = (plan.length_minutes() * SECS_PER_MINUTE) as f32;
-    let mut table = SlotTable::new(n_participants, timeout_secs);
     let (mut now_secs, mut late) = (0, 0);
-    let mut present: Vec<Participant> = Vec::new();
+    let mut participants: Vec<Participant> = Vec::new();
     for k in 0..n_participants {
         let mut draws = RngStream::new(plan.seed(), "study_participants", u64::from(k));
         now_secs += draws.range(0.0, MAX_ARRIVAL_SECS) as u64;
-        late += leave(&mut table, &mut present, now_secs);
+        late += leave(&mut participants, now_secs);
         let stay_secs = draws.range(STAY[0], STAY[1]) * length_secs;
         let finishes = !draws.chance(dropout as f32);
+        let holders = participants.iter().map(|participant| participant.holder);
         // There are as many slots as participants, so one is free.
-        if let Some(claim) = table.claim(now_secs) {
+        if let Some(slot) = lowest_free_slot(n_participants, timeout_secs, now_secs, holders) {
+            let holder = SlotHolder { slot, since_secs: now_secs, is_complete: false };
             let leaves_secs = now_secs + stay_secs as u64;
-            present.push(Participant { claim, leaves_secs, finishes });
+            participants.push(Participant { holder, leaves_secs, finishes });
         }
     }
-    late += leave(&mut table, &mut present, u64::MAX);
-    balance(plan, n_participants, &table, late)
+    late += leave(&mut participants, u64::MAX);
+    let complete = participants.iter().filter(|participant| participant.holder.is_complete);
+    let done: BTreeSet<u32> = complete.map(|participant| participant.holder.slot).collect();
+    balance(plan, n_participants, &done, late)
 }
 
-/// Ends the participants who leave up to now, in this order. Returns the number of late ones.
-fn leave(table: &mut SlotTable, present: &mut Vec<Participant>, now_secs: u64) -> u32 {
-    present.sort_by_key(|participant| participant.leaves_secs);
-    let n_leaving = present.partition_point(|participant| participant.leaves_secs <= now_secs);
-    let finished = present.drain(..n_leaving).filter(|participant| participant.finishes);
-    finished.filter(|participant| table.finish(participant.claim) == Finish::Late).count() as u32
+/// Ends the participants who leave up to now. Returns the number of those whose slot had been given away.
+fn leave(participants: &mut [Participant], now_secs: u64) -> u32 {
+    let mut late = 0;
+    for k in 0..participants.len() {
+        let Participant { holder, leaves_secs, finishes } = participants[k];
+        if finishes && !holder.is_complete && leaves_secs <= now_secs {
+            let has_slot = |other: &Participant| other.holder.slot == holder.slot;
+            late += u32::from(participants[k + 1..].iter().any(has_slot));
+            participants[k].holder.is_complete = true;
+        }
+    }
+    late
 }
 
-fn balance(plan: &Plan, arrived: u32, table: &SlotTable, late: u32) -> Balance {
+fn balance(plan: &Plan, arrived: u32, done: &BTreeSet<u32>, late: u32) -> Balance {
     let assignment = plan.assignment();
     let n_positions = assignment.orders()[0].len();
     let mut counts = vec![vec![0; plan.conditions().len()]; n_positions];
     let mut blocks: BTreeMap<usize, usize> = BTreeMap::new();
-    let mut completed = 0;
-    for slot in table.done() {
-        completed += 1;
+    for slot in done.iter().copied() {
         *blocks.entry(assignment.block(slot)).or_default() += 1;
         for (position, condition) in assignment.order(slot).iter().enumerate() {
             counts[position][*condition] += 1;
@@ -97,5 +105,5 @@ fn balance(plan: &Plan, arrived: u32, table: &SlotTable, late: u32) -> Balance {
     }
     let n_orders = assignment.orders().len();
     let open_blocks = blocks.values().filter(|n| **n < n_orders).count() as u32;
-    Balance { arrived, completed, late, counts, open_blocks }
+    Balance { arrived, completed: done.len() as u32, late, counts, open_blocks }
 }

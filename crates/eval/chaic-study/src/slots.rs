@@ -1,136 +1,61 @@
-//! State of the slots of a study: which are free, taken or done. Time is a parameter.
+//! Slots of a study: which one the next participant gets. Time is a parameter.
 
-/// State of a slot.
+/// A participant with a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum SlotState {
-    Free,
-    /// A participant has it.
-    Taken {
-        /// Number of the claim.
-        claim: u64,
-        /// Time of the claim, seconds.
-        since_secs: u64,
-    },
-    /// A participant has finished.
-    Done,
-}
-
-/// A participant's right to a slot.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Claim {
+pub struct SlotHolder {
     /// Slot, from 1.
     pub slot: u32,
-    number: u64,
+    /// Time of the entry, seconds.
+    pub since_secs: u64,
+    /// True if the participant has finished.
+    pub is_complete: bool,
 }
 
-/// Effect of the end of a participant.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Finish {
-    /// The slot is done.
-    Counted,
-    /// The slot was freed by time-out, and another participant has it or has finished it. The data are
-    /// additional.
-    Late,
-}
-
-/// Slots of a study.
-#[derive(Clone, Debug)]
-pub struct SlotTable {
+/// Returns the lowest free one of `n_slots` slots at the time `now_secs`. A slot is done if a participant with
+/// it has finished, and taken until `timeout_secs` after the entry of its last participant.
+pub fn lowest_free_slot(
+    n_slots: u32,
     timeout_secs: u64,
-    slots: Vec<SlotState>,
-    n_claims: u64,
-}
-
-impl SlotTable {
-    /// Creates `n` free slots. A slot is free again `timeout_secs` after it was taken.
-    pub fn new(n: u32, timeout_secs: u64) -> SlotTable {
-        SlotTable { timeout_secs, slots: vec![SlotState::Free; n as usize], n_claims: 0 }
-    }
-
-    /// Takes the lowest free slot at the time `now_secs`; `None` if all are taken or done.
-    pub fn claim(&mut self, now_secs: u64) -> Option<Claim> {
-        let is_free = |state: &SlotState| match *state {
-            SlotState::Free => true,
-            SlotState::Taken { since_secs, .. } => {
-                now_secs.saturating_sub(since_secs) >= self.timeout_secs
-            }
-            SlotState::Done => false,
-        };
-        let k = self.slots.iter().position(is_free)?;
-        self.n_claims += 1;
-        self.slots[k] = SlotState::Taken { claim: self.n_claims, since_secs: now_secs };
-        Some(Claim { slot: k as u32 + 1, number: self.n_claims })
-    }
-
-    /// Ends a participant's work. A participant who is late and whose slot was not given away counts.
-    pub fn finish(&mut self, claim: Claim) -> Finish {
-        if !self.is_held(claim) {
-            return Finish::Late;
-        }
-        self.slots[claim.slot as usize - 1] = SlotState::Done;
-        Finish::Counted
-    }
-
-    /// Frees the slot of a participant who has left and whose data are deleted.
-    pub fn withdraw(&mut self, claim: Claim) {
-        if self.is_held(claim) {
-            self.slots[claim.slot as usize - 1] = SlotState::Free;
+    now_secs: u64,
+    holders: impl IntoIterator<Item = SlotHolder>,
+) -> Option<u32> {
+    let mut is_taken = vec![false; n_slots as usize];
+    for SlotHolder { slot, since_secs, is_complete } in holders {
+        if is_complete || now_secs.saturating_sub(since_secs) < timeout_secs {
+            is_taken[slot as usize - 1] = true;
         }
     }
-
-    /// Returns the slots that are done.
-    pub fn done(&self) -> impl Iterator<Item = u32> {
-        let numbered = (1..).zip(&self.slots);
-        numbered.filter(|(_, state)| **state == SlotState::Done).map(|(slot, _)| slot)
-    }
-
-    fn is_held(&self, Claim { slot, number }: Claim) -> bool {
-        let state = self.slots.get(slot as usize - 1);
-        matches!(state, Some(SlotState::Taken { claim, .. }) if *claim == number)
-    }
+    (1..).zip(is_taken).find(|(_, is_taken)| !is_taken).map(|(slot, _)| slot)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn claim(table: &mut SlotTable, now_secs: u64) -> Claim {
-        table.claim(now_secs).expect("a free slot")
-    }
-
     #[test]
-    fn a_slot_is_free_after_its_time_out_and_not_before() {
-        let mut table = SlotTable::new(2, 60);
-        let first = claim(&mut table, 0);
-        assert_eq!((first.slot, claim(&mut table, 1).slot), (1, 2));
-        assert_eq!(table.claim(59), None);
-        let second = claim(&mut table, 60);
-        assert_eq!(second.slot, 1);
-        // The first participant is late: the slot belongs to the second one.
-        assert_eq!(table.finish(first), Finish::Late);
-        assert_eq!(table.finish(second), Finish::Counted);
-        assert_eq!(table.finish(second), Finish::Late);
-        assert_eq!(table.done().collect::<Vec<_>>(), [1]);
-        assert_eq!(claim(&mut table, 1000).slot, 2);
-        assert_eq!(table.claim(1000), None);
-    }
-
-    #[test]
-    fn a_late_participant_counts_if_the_slot_was_not_given_away() {
-        let mut table = SlotTable::new(1, 60);
-        let only = claim(&mut table, 0);
-        assert_eq!(table.finish(only), Finish::Counted);
-        assert_eq!(table.claim(1_000_000), None);
-    }
-
-    #[test]
-    fn a_withdrawn_slot_is_free_at_once() {
-        let mut table = SlotTable::new(1, 60);
-        let first = claim(&mut table, 0);
-        table.withdraw(first);
-        let second = claim(&mut table, 0);
-        // A repeated withdrawal does not concern the next participant.
-        table.withdraw(first);
-        assert_eq!(table.finish(second), Finish::Counted);
+    fn a_slot_is_free_after_its_time_out_unless_somebody_has_finished_it() {
+        let holder = |slot, since_secs, is_complete| SlotHolder { slot, since_secs, is_complete };
+        let free = |holders: &[SlotHolder], now_secs| {
+            lowest_free_slot(2, 60, now_secs, holders.iter().copied())
+        };
+        assert_eq!(free(&[], 0), Some(1));
+        let both = [holder(1, 0, false), holder(2, 1, false)];
+        assert_eq!(
+            [0, 59, 60, 61].map(|now_secs| free(&both, now_secs)),
+            [None, None, Some(1), Some(1)]
+        );
+        // The first slot was given away; one of its two participants has finished it.
+        for finished in [0, 2] {
+            let mut holders = [both[0], both[1], holder(1, 60, false)];
+            assert_eq!(free(&holders, 61), Some(2));
+            holders[finished].is_complete = true;
+            assert_eq!(free(&holders, 1000), Some(2));
+        }
+        assert_eq!(free(&both.map(|both| holder(both.slot, 0, true)), 1000), None);
+        assert_eq!(
+            free(&both[1..], 2),
+            Some(1),
+            "a participant whose data are deleted has no slot"
+        );
     }
 }

@@ -6,8 +6,7 @@ use chaic_core::observation::Grants;
 use chaic_core::task::SceneKind;
 
 use super::*;
-use crate::perception::{GroundTruthIds, PixelTargets};
-use crate::perception_factory::GroundTruthPerceptionFactory;
+use crate::perception_factory::{GroundTruthPerceptionFactory, GroundTruthTracksFactory};
 use crate::policies::{PartnerVariantPolicy, RulePolicy, RuleProfile};
 use crate::test_support::{Toy, ToyObject};
 use crate::{helpers, partners};
@@ -93,11 +92,11 @@ fn an_agent_with_pixel_targets_delivers_too() {
     let (mut toy, n) = house();
     toy.grants_ids = false;
     let briefing = Briefing { grants: Grants::NONE, ..toy.briefing() };
-    let perception = PixelTargets::<GroundTruthIds>::default();
+    let perception = GroundTruthTracksFactory.perception();
     let behavior = Box::new(GroundTruthBehavior::default());
     let rules = crate::PlannerRules::paper();
     let policy = RulePolicy::new(RuleProfile::RHP);
-    let mut agent = PlanningAgent::with(policy, Box::new(perception), behavior, rules);
+    let mut agent = PlanningAgent::with(policy, perception, behavior, rules);
     let plans = toy.run(&mut agent, &briefing);
     assert!(toy.delivered.len() >= n, "{} delivered: {}", toy.delivered.len(), plans.join("; "));
 }

@@ -412,3 +412,23 @@ fn a_frame_history_beyond_the_observation_limit_is_refused_before_the_first_imag
     assert!(log.lock().unwrap().is_empty(), "the agent is not asked");
     assert_eq!(env.world().state().frame, 0);
 }
+
+#[test]
+fn color_drawn_on_demand_equals_that_of_an_observation() {
+    let episode = test_episode(TaskId::LowTarget);
+    let image = |rgb: bool| {
+        let sensors =
+            SensorConfig { image_size: 64, rgb, depth: true, ids: false, frame_history: None };
+        let helper = Some(AgentSlot::external(Grants::NONE, sensors));
+        let agents = EpisodeAgents { helper, partner: None };
+        let mut env = Env::new(config(&episode), agents).expect("the episode is valid");
+        env.advance(None).expect("no agent fails");
+        let drawn = env.render_color(AgentId::HELPER);
+        let observation = env.observe(AgentId::HELPER).expect("the helper waits");
+        (drawn, observation.images.rgb.clone())
+    };
+    let (drawn, none) = image(false);
+    let (drawn_again, observed) = image(true);
+    assert_eq!(none, None);
+    assert!(drawn == drawn_again && Some(drawn) == observed);
+}

@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 
+use chaic_study::data::CODE_ALPHABET;
 use chaic_study::{Plan, Study};
 use chaic_study_server::{Counts, ServerError, ServerOptions, StudyServer};
 use serde_json::{Value, json};
@@ -140,8 +141,7 @@ impl Drop for Server {
 
 /// Returns a participant code for each number below 32 * 32.
 pub fn code(n: usize) -> String {
-    const ALPHABET: &[u8] = b"ABCDEFGHJKLMNPQRSTUVWXYZ23456789";
-    let letter = |k: usize| char::from(ALPHABET[k % 32]);
+    let letter = |k: usize| char::from(CODE_ALPHABET[k % 32]);
     format!("TESTCQDE{}{}", letter(n / 32), letter(n))
 }
 

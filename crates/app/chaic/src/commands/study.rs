@@ -94,7 +94,11 @@ fn check_text(plan: &Plan, balance: &Balance, dropout: u8) -> String {
         counted(plan.study().participants as usize, "slot"),
         orders.join(" | "),
         plan.length_minutes(),
-        if *late == 0 { String::new() } else { format!(", {late} too late to count") },
+        if *late == 0 {
+            String::new()
+        } else {
+            format!("; {late} finish after their slot was given away")
+        },
         balance.spread(),
         counted(*open_blocks as usize, "incomplete block"),
     )

@@ -81,7 +81,9 @@ fn noisy_perception_is_recorded_and_unknown_ones_are_refused() {
     run_ok(dir, &[&EVAL[..], &["--perception", "noisy:rates.json", "--out", "run"]].concat());
     assert!(fs::read_to_string(dir.join("run/run.json")).unwrap().contains("noisy:rates.json"));
     run_ok(dir, &["verify", "run"]);
-    run_ok(dir, &[&EVAL[..], &["--perception", "noisy", "--out", "as the detector"]].concat());
+    for perception in ["noisy", "gt_tracks"] {
+        run_ok(dir, &[&EVAL[..], &["--perception", perception, "--out", perception]].concat());
+    }
     for nonsense in ["perfect", "learned:", "noisy:nowhere"] {
         let error = run_err(dir, &[&EVAL[..], &["--perception", nonsense]].concat());
         assert_eq!(error.lines().count(), 1, "{error}");

@@ -1,9 +1,9 @@
 //! Actor-critic network for a variable number of candidates.
 //!
 //! Number and order of candidates differ between decisions. Each candidate is scored together with
-//! the state, as in pointer networks (Vinyals et al. 2015). The candidates of a decision and a row
-//! for the state attend to each other (Vaswani et al. 2017), so that scores and value depend on all
-//! of them, in any order.
+//! the state, as in pointer networks (Vinyals et al. 2015). The candidates of a decision, a row for
+//! the state and rows of earlier decisions attend to each other (Vaswani et al. 2017), so that scores
+//! and value depend on all of them, in any order.
 
 use std::ops::Range;
 
@@ -21,6 +21,9 @@ pub struct CandidateSet {
     pub candidates: Vec<f32>,
     /// Number of candidates.
     pub n_candidates: usize,
+    /// Earlier decisions, shape [decisions, state features + candidate features]: the state of each,
+    /// and the candidate that was chosen. Empty for policies without memory.
+    pub memory: Vec<f32>,
 }
 
 /// Network architecture without parameter values.
@@ -167,14 +170,19 @@ impl CandidateScorer {
         Pass::new(&self.network, widest())
     }
 
-    /// Returns the input rows: for each decision one of the state alone, for the state outputs, and
-    /// one per candidate.
+    /// Returns the numbers of input rows per decision.
+    fn n_rows(&self, decision: &CandidateSet) -> usize {
+        1 + decision.n_candidates + decision.memory.len() / (self.n_state + self.n_candidate)
+    }
+
+    /// Returns the input rows: for each decision one of the state alone, for the state outputs, one
+    /// per candidate, and one per earlier decision.
     fn rows<'a>(
         &self,
         parameters: &[f32],
         decisions: impl Iterator<Item = &'a CandidateSet> + Clone,
     ) -> Tensor {
-        let n = decisions.clone().map(|d| d.n_candidates + 1).sum();
+        let n = decisions.clone().map(|d| self.n_rows(d)).sum();
         let channels = self.n_state + self.n_candidate;
         let mut tensor = Tensor::zeros(Shape { n, height: 1, width: 1, channels });
         let mut rows = tensor.data.chunks_exact_mut(channels);
@@ -189,6 +197,11 @@ impl CandidateScorer {
                     candidate.copy_from_slice(&decision.candidates[from..from + self.n_candidate]);
                     self.normalizer.apply(parameters, self.n_state, candidate);
                 }
+            }
+            for earlier in decision.memory.chunks_exact(channels) {
+                let Some(row) = rows.next() else { return tensor };
+                row.copy_from_slice(earlier);
+                self.normalizer.apply(parameters, 0, row);
             }
         }
         tensor
@@ -208,7 +221,7 @@ impl ActorCritic for CandidateScorer {
         decisions: impl Iterator<Item = &'a CandidateSet> + Clone,
         pass: &mut Pass,
     ) -> Vec<ActorCriticOutput> {
-        pass.set_groups(decisions.clone().map(|d| d.n_candidates + 1));
+        pass.set_groups(decisions.clone().map(|d| self.n_rows(d)));
         pass.forward(&self.network, parameters, &self.rows(parameters, decisions.clone()));
         let (logits, state_outputs) =
             (&pass.activation(self.logit_head).data, &pass.activation(self.value_head).data);
@@ -218,7 +231,7 @@ impl ActorCritic for CandidateScorer {
             let logits = &logits[row + 1..][..decision.n_candidates];
             let values = state_outputs[row * self.n_outputs..][..self.n_outputs].to_vec();
             outputs.push(ActorCriticOutput { log_probs: log_softmax(logits), values });
-            row += decision.n_candidates + 1;
+            row += self.n_rows(decision);
         }
         outputs
     }
@@ -232,12 +245,12 @@ impl ActorCritic for CandidateScorer {
     ) {
         pass.zero_gradients();
         let mut row = 0;
-        for grad in grad_outputs {
+        for (k, grad) in grad_outputs.iter().enumerate() {
             let to = &mut pass.gradient(self.value_head).data[row * self.n_outputs..];
             to[..self.n_outputs].copy_from_slice(&grad.values);
             let to = &mut pass.gradient(self.logit_head).data[row + 1..][..grad.logits.len()];
             to.copy_from_slice(&grad.logits);
-            row += grad.logits.len() + 1;
+            row += pass.groups()[k];
         }
         pass.backward(&self.network, parameters, grad_parameters);
     }
@@ -256,6 +269,7 @@ mod tests {
                 state: (0..3).map(|_| rng.unit()).collect(),
                 candidates: (0..2 * n_candidates).map(|_| rng.unit()).collect(),
                 n_candidates,
+                memory: (0..5 * (n_candidates % 3)).map(|_| rng.unit()).collect(),
             })
             .collect()
     }
@@ -290,8 +304,9 @@ mod tests {
         model.update_normalizer(&mut parameters, all[1..].iter());
         let rows = model.rows(&parameters, all.iter());
         let states: Vec<f64> = rows.data.chunks(5).map(|row| f64::from(row[0])).collect();
-        // The row of the state alone and the rows of its candidates hold the same state.
-        let unique: Vec<f64> = [0, 2, 5].map(|row| states[row]).to_vec();
+        // The row of the state alone and the rows of its candidates hold the same state. The
+        // decisions have three, five and four rows.
+        let unique: Vec<f64> = [0, 3, 8].map(|row| states[row]).to_vec();
         let mean = unique.iter().sum::<f64>() / 3.0;
         let square = unique.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / 3.0;
         assert!(mean.abs() < 1e-3 && (square - 1.0).abs() < 1e-3, "{unique:?}");

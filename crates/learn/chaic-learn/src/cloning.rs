@@ -133,7 +133,7 @@ impl Policy for ExpertPolicy {
             }
             (RolloutActor::Learner(learner), None) => learner.choose(context, valid)?,
             (RolloutActor::Expert(features), _) => {
-                features.history.record(expert_plan, frame);
+                features.record(expert_plan, frame);
                 expert_plan
             }
         };

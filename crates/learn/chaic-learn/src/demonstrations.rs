@@ -19,6 +19,8 @@ const ACTIONS: &str = "demonstrations.actions";
 const STATES: &str = "demonstrations.states";
 const CANDIDATES: &str = "demonstrations.candidates";
 const VALUE_TARGETS: &str = "demonstrations.value_targets";
+const MEMORY_LENS: &str = "demonstrations.memory_lens";
+const MEMORY: &str = "demonstrations.memory";
 const PER_EPISODE: &str = "demonstrations.per_episode";
 
 /// Demonstrations by episode, oldest first.
@@ -97,6 +99,8 @@ fn to_sections(episodes: &[Vec<Demonstration>]) -> Checkpoint {
     file.insert_floats(STATES, all().flat_map(|d| d.observation.state.clone()).collect());
     let candidates = all().flat_map(|d| d.observation.candidates.clone());
     file.insert_floats(CANDIDATES, candidates.collect());
+    file.insert_integers(MEMORY_LENS, integers(&mut all().map(|d| d.observation.memory.len())));
+    file.insert_floats(MEMORY, all().flat_map(|d| d.observation.memory.clone()).collect());
     file.insert_floats(VALUE_TARGETS, all().map(|d| d.value_target).collect());
     file
 }
@@ -117,6 +121,9 @@ fn from_sections(
     if !n_candidates.iter().zip(actions).all(is_valid) {
         return Err(CheckpointError::section(ACTIONS, "does not fit the candidates"));
     }
+    let memory_lens = file.integers(MEMORY_LENS, n)?;
+    let n_memory = memory_lens.iter().fold(0, |sum: usize, n| sum.saturating_add(*n as usize));
+    let mut memory = file.floats(MEMORY, n_memory)?.iter().copied();
     let mut rows = candidates.chunks_exact(n_plan);
     let mut demonstrations = (0..n).map(|k| {
         let n_candidates = n_candidates[k] as usize;
@@ -124,6 +131,7 @@ fn from_sections(
             state: states[k * n_state..][..n_state].to_vec(),
             candidates: rows.by_ref().take(n_candidates).flatten().copied().collect(),
             n_candidates,
+            memory: memory.by_ref().take(memory_lens[k] as usize).collect(),
         };
         Demonstration { observation, action: actions[k] as usize, value_target: value_targets[k] }
     });
@@ -144,6 +152,7 @@ mod tests {
                 state: (0..N_STATE).map(|_| rng.unit()).collect(),
                 candidates: (0..N_PLAN * (k + 2)).map(|_| rng.unit()).collect(),
                 n_candidates: k + 2,
+                memory: (0..k * (N_STATE + N_PLAN)).map(|_| rng.unit()).collect(),
             },
             action: k,
             value_target: rng.unit(),

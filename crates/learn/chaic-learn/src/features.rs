@@ -14,9 +14,10 @@ use chaic_agents::policies::{InferOptions, InferPolicy};
 use chaic_core::briefing::CompanionRole;
 use chaic_core::capability::Persona;
 use chaic_core::geom::{horizontal_distance, to_xz};
-use chaic_core::{Briefing, ClassId, Observation, Role, Vec3};
+use chaic_core::{Briefing, ClassId, Frame, Observation, Role, Vec3};
 
 use crate::candidate_scorer::CandidateSet;
+use crate::decision_memory::DecisionMemory;
 use crate::opponent::network::{N_GOALS, OpponentModel, OpponentPrediction};
 use crate::opponent::tracker::OpponentTracker;
 use crate::opponent::{N_LIMITS, OpponentGoal};
@@ -155,20 +156,39 @@ pub struct FeatureEncoder {
     opponent: Option<OpponentTracker>,
     /// The helper `infer`, whose choices are marked.
     proposer: Option<InferPolicy>,
+    memory: DecisionMemory,
+    /// Candidates of the last encoding.
+    candidates: Vec<Plan>,
+}
+
+/// Inputs of a policy besides those of memory and belief.
+#[derive(Clone, Debug, Default)]
+pub struct OptionalInputs {
+    /// Opponent model whose predictions are added.
+    pub opponent: Option<Arc<OpponentModel>>,
+    /// True to mark the plan that the helper `infer` would choose.
+    pub has_proposals: bool,
+    /// Number of earlier decisions.
+    pub memory: usize,
 }
 
 impl FeatureEncoder {
-    /// Creates an encoder, with an opponent model if there is one. `has_proposals` adds the feature
-    /// that marks the plan of the helper `infer`.
-    pub fn new(has_proposals: bool, opponent: Option<Arc<OpponentModel>>) -> FeatureEncoder {
-        let opponent = opponent.map(OpponentTracker::new);
-        let proposer = has_proposals.then(|| InferPolicy::new(InferOptions::ALL));
-        FeatureEncoder { history: PlanHistory::default(), episode: None, opponent, proposer }
+    /// Creates an encoder.
+    pub fn new(inputs: OptionalInputs) -> FeatureEncoder {
+        FeatureEncoder {
+            history: PlanHistory::default(),
+            episode: None,
+            opponent: inputs.opponent.map(OpponentTracker::new),
+            proposer: inputs.has_proposals.then(|| InferPolicy::new(InferOptions::ALL)),
+            memory: DecisionMemory::new(inputs.memory),
+            candidates: Vec::new(),
+        }
     }
 
     /// Starts an episode.
     pub fn reset(&mut self, briefing: &Briefing) {
         self.history = PlanHistory::new(briefing);
+        self.memory.clear();
         self.episode = Some((briefing.clone(), Belief::new(briefing)));
         if let Some(opponent) = &mut self.opponent {
             opponent.reset(briefing);
@@ -225,7 +245,16 @@ impl FeatureEncoder {
             };
             encoded.candidates = rows.zip(candidates).flat_map(mark).collect();
         }
+        self.memory.add_to(&mut encoded, context.memory.frame);
+        self.candidates = candidates.to_vec();
         encoded
+    }
+
+    /// Records the choice of a plan at a frame, after its encoding if there were several candidates.
+    pub fn record(&mut self, plan: Plan, frame: Frame) {
+        self.history.record(plan, frame);
+        let chosen = self.candidates.iter().position(|candidate| *candidate == plan);
+        self.memory.record(chosen, frame);
     }
 
     fn encode_without_proposals(
@@ -372,7 +401,7 @@ fn encode_plans(
         let is_first = !std::mem::replace(&mut has_kind[plan.kind()], true);
         shared.push_plan(plan, is_first, &mut features);
     }
-    CandidateSet { state, candidates: features, n_candidates: valid.len() }
+    CandidateSet { state, candidates: features, n_candidates: valid.len(), memory: Vec::new() }
 }
 
 /// Returns the sum of the probabilities of one outcome.

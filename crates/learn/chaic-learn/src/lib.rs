@@ -2,7 +2,8 @@
 //!
 //! **What it is**: [`actor_critic`] is the interface of policy networks, [`candidate_scorer`] a
 //! network for any number of candidates, [`ppo`] proximal policy optimization. [`features`] encodes
-//! a decision between plans; predictions of the [`opponent`] model may extend it. [`policy`] lets a
+//! a decision between plans; predictions of the [`opponent`] model and earlier decisions may extend
+//! it. [`policy`] lets a
 //! network drive an agent, [`policy_kind`] lists networks by their inputs, and [`rollout`] plays
 //! episodes. [`cloning`] learns from an expert whose choices [`demonstrations`] keeps, and [`train`]
 //! has the trainers. [`visual`] has policies that read images.
@@ -25,6 +26,7 @@ pub mod scales;
 
 pub mod opponent;
 
+mod decision_memory;
 pub mod features;
 
 pub mod cloning;

@@ -93,7 +93,7 @@ impl LearnedPolicy {
     ) -> LearnedPolicy {
         let pass = weights.model.pass();
         let rng = RngStream::new(0, "plans", 0);
-        let features = FeatureEncoder::new(weights.kind.has_proposals, weights.opponent.clone());
+        let features = weights.encoder();
         LearnedPolicy { weights, selection, log, pass, rng, features }
     }
 
@@ -119,7 +119,7 @@ impl LearnedPolicy {
             ActionSelection::Greedy => output.argmax(),
         };
         let plan = candidates[action];
-        self.features.history.record(plan, frame);
+        self.features.record(plan, frame);
         if let Some(log) = &self.log {
             let record = StepRecord {
                 frame,
@@ -144,7 +144,7 @@ impl Policy for LearnedPolicy {
         let candidates = self.features.history.candidates(valid);
         let frame = context.memory.frame;
         if let [single] = candidates[..] {
-            self.features.history.record(single, frame);
+            self.features.record(single, frame);
             return Ok(single);
         }
         let observation = self.features.encode(context, valid, &candidates);

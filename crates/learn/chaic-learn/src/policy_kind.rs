@@ -7,11 +7,18 @@ use chaic_core::observation::Grants;
 use chaic_nn::weights::{self, WeightsError};
 
 use crate::candidate_scorer::CandidateScorer;
-use crate::features::{N_OPPONENT_PLAN, N_OPPONENT_STATE, N_PLAN, N_PROPOSAL_PLAN, N_STATE};
+use crate::decision_memory::N_MEMORY_PLAN;
+use crate::features::{
+    FeatureEncoder, N_OPPONENT_PLAN, N_OPPONENT_STATE, N_PLAN, N_PROPOSAL_PLAN, N_STATE,
+    OptionalInputs,
+};
 use crate::opponent::network::{self, OPPONENT, OpponentInput, OpponentModel};
 
 /// Width of the hidden layers.
 const WIDTH: usize = 96;
+/// Maximum number of earlier decisions that a policy reads. An episode has about 80 decisions, and
+/// the cost of attention grows with the square of the number of rows.
+pub const MAX_MEMORY: usize = 32;
 
 /// Kind of network that chooses plans: its inputs besides the features of memory and belief.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,18 +27,22 @@ pub struct PolicyKind {
     pub opponent: OpponentInput,
     /// True if one feature marks the plan that the helper `infer` would choose.
     pub has_proposals: bool,
+    /// Number of earlier decisions that the network reads, 0 to [`MAX_MEMORY`].
+    pub memory: usize,
 }
 
 impl PolicyKind {
     /// No further inputs.
     pub const PLAIN: PolicyKind =
-        PolicyKind { opponent: OpponentInput::None, has_proposals: false };
+        PolicyKind { opponent: OpponentInput::None, has_proposals: false, memory: 0 };
 
     /// Returns all kinds.
     fn all() -> impl Iterator<Item = PolicyKind> {
-        let with =
-            |opponent| [false, true].map(|has_proposals| PolicyKind { opponent, has_proposals });
-        OpponentInput::ALL.into_iter().flat_map(with)
+        OpponentInput::ALL.into_iter().flat_map(|opponent| {
+            [false, true].into_iter().flat_map(move |has_proposals| {
+                (0..=MAX_MEMORY).map(move |memory| PolicyKind { opponent, has_proposals, memory })
+            })
+        })
     }
 
     /// Number of state features and of features per plan.
@@ -40,7 +51,9 @@ impl PolicyKind {
             OpponentInput::None => (N_STATE, N_PLAN),
             _ => (N_STATE + N_OPPONENT_STATE, N_PLAN + N_OPPONENT_PLAN),
         };
-        (n_state, n_plan + if self.has_proposals { N_PROPOSAL_PLAN } else { 0 })
+        let n_proposal = if self.has_proposals { N_PROPOSAL_PLAN } else { 0 };
+        let n_memory = if self.memory > 0 { N_MEMORY_PLAN } else { 0 };
+        (n_state, n_plan + n_proposal + n_memory)
     }
 
     /// Creates the network architecture. Its parameters include those of the opponent model.
@@ -57,7 +70,11 @@ impl PolicyKind {
     /// Name in weights files.
     pub fn name(self) -> String {
         let proposals = if self.has_proposals { ", proposals of infer" } else { "" };
-        format!("chaic plan policy 4{}{proposals}", self.opponent.kind_suffix())
+        let memory = match self.memory {
+            0 => String::new(),
+            n => format!(", memory of {n} decisions"),
+        };
+        format!("chaic plan policy 4{}{proposals}{memory}", self.opponent.kind_suffix())
     }
 
     /// Returns the range of the opponent model's parameters, if there is one.
@@ -104,6 +121,13 @@ impl PolicyWeights {
         let parameters = weights::from_bytes(&model.network, bytes, &kind.name())?;
         let digest = Some(weights::digest(bytes));
         Ok(PolicyWeights { digest, ..PolicyWeights::new(kind, &model, parameters) })
+    }
+
+    /// Creates an encoder of the network's inputs.
+    pub fn encoder(&self) -> FeatureEncoder {
+        let PolicyKind { has_proposals, memory, .. } = self.kind;
+        let opponent = self.opponent.clone();
+        FeatureEncoder::new(OptionalInputs { opponent, has_proposals, memory })
     }
 
     /// Returns the grants of a helper with this policy: those of the paper's helpers, and the

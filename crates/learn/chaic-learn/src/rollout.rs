@@ -20,7 +20,6 @@ use chaic_episodes::{SplitError, find_episode};
 use rayon::prelude::*;
 
 use crate::cloning::{Demonstration, ExpertInfo, ExpertPolicy, RolloutActor};
-use crate::features::FeatureEncoder;
 use crate::policy::{ActionSelection, LearnedPolicy, StepLog, StepRecord, policy_helper};
 use crate::policy_kind::PolicyWeights;
 use crate::ppo::{Trajectory, Transition};
@@ -223,9 +222,7 @@ pub fn rollout_with_expert(
             let learner = LearnedPolicy::new(Arc::clone(weights), context.selection, None);
             RolloutActor::Learner(Box::new(learner))
         } else {
-            let opponent = weights.opponent.clone();
-            let features = FeatureEncoder::new(weights.kind.has_proposals, opponent);
-            RolloutActor::Expert(Box::new(features))
+            RolloutActor::Expert(Box::new(weights.encoder()))
         };
         ExpertPolicy::new(expert, goal, actor, log)
     })?;

@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::opponent::network::{OpponentInput, OpponentModel};
 use crate::policy::ActionSelection;
-use crate::policy_kind::{PolicyKind, PolicyWeights};
+use crate::policy_kind::{MAX_MEMORY, PolicyKind, PolicyWeights};
 use crate::reward_config;
 use crate::rollout::{EpisodeResult, RolloutContext, RolloutEpisode, rollout_all};
 
@@ -35,6 +35,7 @@ pub(crate) const ROLLOUT_BOUNDS: BoundTable = &[
     // All decisions of an iteration's episodes are kept: about 0.3 MB per episode.
     ("episodes", integer(1, 4096)),
     ("image_size", integer(16, 1024)),
+    ("memory", integer(0, MAX_MEMORY as i64)),
     ("validation_episodes", integer(1, MAX_VALIDATION_EPISODES)),
     ("rewards", Bound::Table(REWARD_BOUNDS)),
 ];
@@ -78,6 +79,8 @@ pub struct RolloutConfig {
     pub opponent: Option<PathBuf>,
     /// Adds a feature that marks the plan that the helper `infer` would choose.
     pub proposals: bool,
+    /// Number of earlier decisions that the policy reads.
+    pub memory: usize,
     /// Normalizes inputs by their running mean and standard deviation.
     pub normalize: bool,
     /// Validation episodes per task.
@@ -99,6 +102,7 @@ impl Default for RolloutConfig {
             behavior: GROUND_TRUTH.to_owned(),
             opponent: None,
             proposals: false,
+            memory: 0,
             normalize: false,
             validation_episodes: 3,
             rewards: RewardWeights::CUMULATIVE,
@@ -133,7 +137,7 @@ impl RolloutConfig {
     /// Returns the inputs of a policy with this opponent model.
     pub(crate) fn policy_kind(&self, opponent: Option<&OpponentModel>) -> PolicyKind {
         let opponent = OpponentInput::from_model(opponent);
-        PolicyKind { opponent, has_proposals: self.proposals }
+        PolicyKind { opponent, has_proposals: self.proposals, memory: self.memory }
     }
 
     pub(crate) fn perception_factory(&self) -> Result<Arc<dyn PerceptionFactory>, PerceptionError> {

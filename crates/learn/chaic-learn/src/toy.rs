@@ -1,10 +1,12 @@
 //! Tasks with a known best return, to test the learner.
 
+use chaic_core::Frame;
 use chaic_core::geom::math;
 use chaic_core::rng::RngStream;
 
 use crate::actor_critic::ActorCritic as _;
 use crate::candidate_scorer::{CandidateScorer, CandidateSet};
+use crate::decision_memory::{DecisionMemory, N_MEMORY_PLAN};
 use crate::ppo::{Trajectory, Transition};
 
 /// Task with a few actions, all of which are always allowed.
@@ -13,6 +15,8 @@ pub trait ToyTask {
     const N_STATE: usize;
     /// Number of actions.
     const N_ACTIONS: usize;
+    /// Number of earlier decisions that the policy reads.
+    const MEMORY: usize = 0;
 
     /// Starts an episode.
     fn new(rng: &mut RngStream) -> Self;
@@ -123,9 +127,57 @@ impl ToyTask for Maze {
     }
 }
 
+/// Recall of a cue: the first state shows which of two actions is right, and only the choice in the
+/// last state counts. Policies without memory have a mean return of 0.5.
+pub struct Recall {
+    cue: usize,
+    steps: u32,
+}
+
+impl Recall {
+    /// Length of an episode, steps.
+    const STEPS: u32 = 4;
+}
+
+impl ToyTask for Recall {
+    const N_STATE: usize = 2;
+    const N_ACTIONS: usize = 2;
+    const MEMORY: usize = 4;
+
+    fn new(rng: &mut RngStream) -> Recall {
+        Recall { cue: usize::from(rng.chance(0.5)), steps: 0 }
+    }
+
+    fn state(&self) -> Vec<f32> {
+        let is_last = f32::from(u8::from(self.steps + 1 == Recall::STEPS));
+        let cue = if self.steps == 0 { self.cue as f32 * 2.0 - 1.0 } else { 0.0 };
+        vec![cue, is_last]
+    }
+
+    fn step(&mut self, action: usize) -> (f32, bool) {
+        self.steps += 1;
+        let is_last = self.steps == Recall::STEPS;
+        (f32::from(u8::from(is_last && action == self.cue)), !is_last)
+    }
+}
+
 /// Creates a network for a task.
 pub fn network<T: ToyTask>(width: usize) -> CandidateScorer {
-    CandidateScorer::new(T::N_STATE, T::N_ACTIONS, width, 1)
+    let n_memory = if T::MEMORY > 0 { N_MEMORY_PLAN } else { 0 };
+    CandidateScorer::new(T::N_STATE, T::N_ACTIONS + n_memory, width, 1)
+}
+
+/// Encodes a decision between all actions, each by a one-hot vector.
+fn encode<T: ToyTask>(task: &T, memory: &mut DecisionMemory, step: Frame) -> CandidateSet {
+    let n = T::N_ACTIONS;
+    let mut encoded = CandidateSet {
+        state: task.state(),
+        candidates: (0..n * n).map(|k| f32::from(u8::from(k % (n + 1) == 0))).collect(),
+        n_candidates: n,
+        memory: Vec::new(),
+    };
+    memory.add_to(&mut encoded, step);
+    encoded
 }
 
 /// Plays episodes for `n_decisions` steps. Returns all trajectories, of which the last may be
@@ -139,22 +191,20 @@ pub fn collect_trajectories<T: ToyTask>(
     let mut pass = model.pass();
     let (mut trajectories, mut returns) = (Vec::new(), Vec::new());
     let mut remaining = n_decisions;
-    let mut one_hot = vec![0.0; T::N_ACTIONS * T::N_ACTIONS];
-    (0..T::N_ACTIONS).for_each(|k| one_hot[k * T::N_ACTIONS + k] = 1.0);
     while remaining > 0 {
         let mut task = T::new(rng);
         let mut trajectory = Trajectory::default();
+        let mut memory = DecisionMemory::new(T::MEMORY);
+        let mut step = 0;
         let mut episode_return = 0.0;
         let mut continues = true;
         while remaining > 0 && continues {
-            let observation = CandidateSet {
-                state: task.state(),
-                candidates: one_hot.clone(),
-                n_candidates: T::N_ACTIONS,
-            };
+            let observation = encode(&task, &mut memory, step);
             let output =
                 model.forward(parameters, std::iter::once(&observation), &mut pass).remove(0);
             let action = output.sample(rng.unit());
+            memory.record(Some(action), step);
+            step += 1;
             let (reward, has_next) = task.step(action);
             (episode_return, continues) = (episode_return + reward, has_next);
             remaining -= 1;
@@ -169,11 +219,7 @@ pub fn collect_trajectories<T: ToyTask>(
         }
         if continues {
             // Truncated: the value estimate of the next state replaces the remaining return.
-            let next = CandidateSet {
-                state: task.state(),
-                candidates: one_hot.clone(),
-                n_candidates: T::N_ACTIONS,
-            };
+            let next = encode(&task, &mut memory, step);
             let output = model.forward(parameters, std::iter::once(&next), &mut pass).remove(0);
             trajectory.bootstrap_value = output.value();
         } else {
@@ -227,6 +273,20 @@ mod tests {
         let (_, returns) = train::<CartPole>(&config, 25, 2048);
         let mean_return = returns.iter().sum::<f32>() / returns.len() as f32;
         assert!(mean_return > 475.0, "{mean_return}");
+    }
+
+    #[test]
+    fn earlier_decisions_are_remembered() {
+        let config = PpoConfig {
+            gamma: 0.98,
+            ent_coef: 0.01,
+            batch_size: 64,
+            learning_rate: 2e-3,
+            ..PpoConfig::default()
+        };
+        let (_, returns) = train::<Recall>(&config, 20, 512);
+        let mean_return = returns.iter().sum::<f32>() / returns.len() as f32;
+        assert!(mean_return > 0.95, "{mean_return}");
     }
 
     #[test]

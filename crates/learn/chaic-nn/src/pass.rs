@@ -53,6 +53,11 @@ impl Pass {
         self.groups.extend(sizes);
     }
 
+    /// Returns the group sizes of [`Pass::set_groups`].
+    pub fn groups(&self) -> &[usize] {
+        &self.groups
+    }
+
     /// Returns the output of a node.
     pub fn activation(&self, node: Node) -> &Tensor {
         &self.activations[node.0]

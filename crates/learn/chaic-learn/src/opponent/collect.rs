@@ -488,6 +488,7 @@ fn parse(bytes: &[u8]) -> Result<Vec<LabeledWindow>, String> {
                     state: state[k * N_STATE..][..N_STATE].to_vec(),
                     candidates: candidates.by_ref().take(n_candidates).flatten().copied().collect(),
                     n_candidates,
+                    memory: Vec::new(),
                 },
                 goal: goal
                     .ok_or_else(|| format!("goal {} of window {k} is not a goal", goals[k]))?,

@@ -198,7 +198,7 @@ impl ObservationHistory {
             let sets = self.classes[k].info().sets;
             candidates.extend(TARGET_SETS.iter().map(|set| flag(sets.contains(set))));
         }
-        CandidateSet { state, candidates, n_candidates: self.classes.len() }
+        CandidateSet { state, candidates, n_candidates: self.classes.len(), memory: Vec::new() }
     }
 
     fn state(

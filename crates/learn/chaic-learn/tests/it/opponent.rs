@@ -39,7 +39,7 @@ fn windows_are_within_bounds_and_read_back_unchanged() {
     assert!(samples.iter().any(|s| s.goal == OpponentGoal::Unknown));
     assert!(samples.iter().any(|s| s.target.is_some()));
     for sample in &samples {
-        let CandidateSet { state, candidates, n_candidates } = &sample.window;
+        let CandidateSet { state, candidates, n_candidates, .. } = &sample.window;
         assert_eq!((state.len(), candidates.len()), (N_STATE, n_candidates * N_CLASS));
         let all = || state.iter().chain(candidates);
         assert!(all().all(|x| (-1.0..=1.0).contains(x)), "{:?}", all().collect::<Vec<_>>());
@@ -151,6 +151,7 @@ fn reports_weight_goals_equally() {
             state: vec![0.0; N_STATE],
             candidates: vec![0.0; 2 * N_CLASS],
             n_candidates: 2,
+            memory: Vec::new(),
         },
         goal,
         target: (goal == OpponentGoal::Pick).then_some(0),

@@ -78,6 +78,7 @@ fn interrupted_trainings_end_with_the_same_bits() {
         n_steps: 5,
         rollout: RolloutConfig {
             proposals: true,
+            memory: 4,
             partners: vec!["slow".to_owned()],
             ..small_rollout()
         },
@@ -147,8 +148,12 @@ fn inputs_are_normalized_only_from_the_start() {
     assert!(problem.contains("rollout.normalize"), "{problem}");
     assert!(read(&PpoTrainingConfig::default(), &parameters).is_ok());
     let (n_state, n_plan) = kind.n_features();
-    let observation =
-        CandidateSet { state: vec![0.5; n_state], candidates: vec![0.5; n_plan], n_candidates: 1 };
+    let observation = CandidateSet {
+        state: vec![0.5; n_state],
+        candidates: vec![0.5; n_plan],
+        n_candidates: 1,
+        memory: Vec::new(),
+    };
     model.update_normalizer(&mut parameters, std::iter::once(&observation));
     assert!(read(&config, &parameters).is_ok());
 }

@@ -16,6 +16,9 @@ use crate::track::TrackId;
 const MIN_STEP_FRAMES: Frame = 600;
 /// Time for one step, relative to the recorded time. The partner may search where the person did not.
 const STEP_TIME_FACTOR: Frame = 2;
+/// Minimum time for which it searches for the object of a step before it goes on with later steps, frames:
+/// 5 s, about a look around.
+const MIN_SEARCH_FRAMES: Frame = 150;
 /// Attempts beyond the recorded ones, for a step in which the person succeeded: outcomes are random.
 const EXTRA_ATTEMPTS: u32 = 2;
 /// Interval at which a search reconsiders its plan, frames: that of the rules
@@ -65,6 +68,8 @@ struct PendingStep {
     n_left: u32,
     /// Earliest frame of the next attempt.
     not_before: Frame,
+    /// True if its object was not found; later steps come first until it is seen.
+    is_postponed: bool,
     /// Progress since the step began; `None` before it began.
     begun: Option<BegunStep>,
 }
@@ -87,6 +92,8 @@ enum StepChoice {
     Skip,
     /// The step is tried again from this frame on.
     Defer(Frame),
+    /// The step waits until its object is seen.
+    Postpone,
 }
 
 /// Repeats the steps of a recording, and then follows the rules. It walks, searches and remembers by
@@ -98,10 +105,11 @@ pub struct RecordedPolicy {
     queue: VecDeque<PendingStep>,
     has_looked_around: bool,
     last_choice: Frame,
-    n_repeated: u64,
-    n_skipped: u64,
+    n_repeated: usize,
     /// True if the last choice replaces the current plan in any case.
     ends_current: bool,
+    /// True if the last choice is that of the rules.
+    follows_rules: bool,
 }
 
 impl RecordedPolicy {
@@ -111,6 +119,7 @@ impl RecordedPolicy {
             step: *step,
             n_left: step.n_attempts + if step.is_success { EXTRA_ATTEMPTS } else { 0 },
             not_before: 0,
+            is_postponed: false,
             begun: None,
         };
         RecordedPolicy {
@@ -120,20 +129,24 @@ impl RecordedPolicy {
             has_looked_around: false,
             last_choice: 0,
             n_repeated: 0,
-            n_skipped: 0,
             ends_current: false,
+            follows_rules: false,
         }
     }
 
-    /// Index of the first step that is not deferred.
-    fn due(&self, now: Frame) -> Option<usize> {
-        self.queue.iter().position(|pending| pending.not_before <= now)
+    /// Index of the first step that is neither deferred nor waiting for its object.
+    fn due(&self, context: &Context<'_>) -> Option<usize> {
+        let now = context.memory.frame;
+        let is_due = |pending: &PendingStep| {
+            pending.not_before <= now && (!pending.is_postponed || pending.is_known(context))
+        };
+        self.queue.iter().position(is_due)
     }
 
     /// Returns the plan for the next step that is possible; `None` if none is possible now.
     fn next_plan(&mut self, context: &Context<'_>, valid: &[Plan]) -> Option<Plan> {
         let now = context.memory.frame;
-        while let Some(index) = self.due(now) {
+        while let Some(index) = self.due(context) {
             let n_history = context.memory.history.len();
             let pending = &mut self.queue[index];
             pending.begun.get_or_insert(BegunStep { frame: now, n_history });
@@ -144,11 +157,14 @@ impl RecordedPolicy {
                     self.queue.remove(index);
                 }
                 StepChoice::Skip => {
-                    self.n_skipped += 1;
                     self.queue.remove(index);
                 }
                 StepChoice::Defer(until) => {
                     pending.not_before = until.max(now + 1);
+                    pending.begun = None;
+                }
+                StepChoice::Postpone => {
+                    pending.is_postponed = true;
                     pending.begun = None;
                 }
             }
@@ -224,9 +240,7 @@ impl PendingStep {
             return StepChoice::Defer(object.ignore_until);
         }
         let Some(object) = object.filter(|o| o.is_present) else {
-            // It was not seen yet, or is not where it was.
-            let can_search = !context.is_explored;
-            return if can_search { StepChoice::Plan(Plan::Explore) } else { StepChoice::Skip };
+            return self.search(context);
         };
         let Briefing { possible_targets, containers, obstacles, .. } = context.briefing;
         let kinds = [possible_targets, containers, obstacles];
@@ -239,10 +253,36 @@ impl PendingStep {
         match is_full {
             // Full hands, or no path.
             true if is_container && hands.has_container => StepChoice::Skip,
+            true if valid.contains(&Plan::PutIn) => StepChoice::Plan(Plan::PutIn),
             true if valid.contains(&Plan::Deliver) => StepChoice::Plan(Plan::Deliver),
             _ if context.is_explored => StepChoice::Skip,
             _ => StepChoice::Plan(Plan::Explore),
         }
+    }
+
+    /// Chooses how to go on with a step whose object was not seen yet, or is not where it was.
+    fn search(&self, context: &Context<'_>) -> StepChoice {
+        let limit = MIN_SEARCH_FRAMES.max(self.step.duration_frames);
+        let is_long = self
+            .begun
+            .is_some_and(|begun| context.memory.frame > begun.frame.saturating_add(limit));
+        match (context.is_explored, is_long) {
+            (true, _) => StepChoice::Skip,
+            (false, true) => StepChoice::Postpone,
+            (false, false) => StepChoice::Plan(Plan::Explore),
+        }
+    }
+
+    /// Returns whether the object of the step is where the partner can see it, as far as it knows.
+    fn is_known(&self, context: &Context<'_>) -> bool {
+        let track = match self.step.interaction {
+            RecordedInteraction::PickUp(track) | RecordedInteraction::RemoveObstacle(track) => {
+                track
+            }
+            RecordedInteraction::PutIn | RecordedInteraction::PutOn => return true,
+        };
+        let memory = context.memory;
+        memory.objects.get(track).is_some_and(|object| object.is_available(memory.frame))
     }
 
     /// Returns the agent's interactions since the step began.
@@ -298,12 +338,13 @@ impl Policy for RecordedPolicy {
             }
         }
         let plan = self.next_plan(context, valid);
+        self.follows_rules = plan.is_none();
         Ok(plan.unwrap_or_else(|| self.rules.decide(context, valid)))
     }
 
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, has_changed: bool) -> bool {
         let now = context.memory.frame;
-        let Some(pending) = self.due(now).map(|index| &self.queue[index]) else {
+        let Some(pending) = self.due(context).map(|index| &self.queue[index]) else {
             return self.rules.reconsiders(context, current, has_changed);
         };
         match current {
@@ -319,7 +360,7 @@ impl Policy for RecordedPolicy {
     }
 
     fn status(&self) -> Option<String> {
-        Some(if self.queue.is_empty() { "rules" } else { "recording" }.to_owned())
+        Some(if self.follows_rules { "rules" } else { "recording" }.to_owned())
     }
 
     fn recording(&self) -> Option<String> {
@@ -327,8 +368,9 @@ impl Policy for RecordedPolicy {
     }
 
     fn counters(&self) -> BTreeMap<String, u64> {
-        let steps = [("repeated", self.n_repeated), ("skipped", self.n_skipped)];
-        steps.into_iter().map(|(name, n)| (name.to_owned(), n)).collect()
+        let n_skipped = self.recording.steps.len() - self.n_repeated;
+        let steps = [("repeated", self.n_repeated), ("skipped", n_skipped)];
+        steps.into_iter().map(|(name, n)| (name.to_owned(), n as u64)).collect()
     }
 
     fn fork(&self) -> Option<RecordedPolicy> {

@@ -134,7 +134,7 @@ fn files_without_recordings_are_ignored_in_folders_and_refused_alone() {
     let other = "{\"task\":\"shopping\"}\n".to_owned();
     let read = |source: &str, files: &[(&str, &String)]| {
         let content = |(name, text): &(&str, &String)| {
-            Ok::<_, EnvError>((PathBuf::from(name), text.clone().into_bytes()))
+            Ok::<_, EnvError>((PathBuf::from(name), text.as_bytes().to_vec()))
         };
         Recordings::collect(Path::new(source), files.iter().map(content))
     };

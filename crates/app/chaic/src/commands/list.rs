@@ -147,8 +147,8 @@ fn partners(format: OutputFormat) -> Result<()> {
         let person = person.map(|change| change.to_string()).unwrap_or_default();
         suite.add_row([name.as_str(), partner.as_deref().unwrap_or(RULES), &person]);
     }
-    let more = "`--partner NAME` selects one; also drawn:SEED, habits:..., recorded:PATH (a trace or a folder of \
-                traces)\nand policy:FILE (weights of `chaic train partner`). `--person` selects the body.\n\
+    let more = "`--partner NAME` selects one; also drawn:SEED, habits:..., recorded:PATH (a trace or a folder)\n\
+                and policy:FILE (weights of `chaic train partner`). `--person` selects the body.\n\
                 `--partners suite` plays all of the second table. docs/people.md.\n";
     let text = format!("{}\n{}\n{more}", minds.trim_fmt(), suite.trim_fmt());
     print_result(format, &rows, &text)

@@ -73,13 +73,6 @@ pub const N_PARTNER_STATE: usize = PARTNER_STATE_FEATURES.len() + N_KINDS;
 /// Number of plan features.
 pub const N_PARTNER_PLAN: usize = N_KINDS + PARTNER_PLAN_FEATURES.len();
 
-/// Returns the indices of the candidates that pick up a target.
-pub fn pick_ups(observation: &CandidateSet) -> Vec<usize> {
-    let kind = Plan::KINDS.iter().position(|name| *name == "pick_up").expect("it is a kind");
-    let rows = observation.candidates.chunks_exact(N_PARTNER_PLAN).enumerate();
-    rows.filter(|(_, row)| row[kind] > 0.0).map(|(k, _)| k).collect()
-}
-
 /// Returns the index of the nearest wanted target among the candidates, if there is one.
 pub fn nearest_wanted(observation: &CandidateSet) -> Option<usize> {
     let feature = PARTNER_PLAN_FEATURES.iter().position(|name| *name == "is_nearest_wanted")?;

@@ -25,7 +25,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::demonstrator::{DemonstrationEpisode, Demonstrator, PartnerDecision};
-use super::features::{N_PARTNER_PLAN, N_PARTNER_STATE, nearest_wanted, pick_ups};
+use super::features::{N_PARTNER_PLAN, N_PARTNER_STATE, nearest_wanted};
 use super::policy::{PARTNER_KIND, partner_network};
 use super::recordings::read_recordings;
 use crate::actor_critic::{ActorCritic as _, Optimizer};
@@ -391,41 +391,41 @@ impl Trainer for PartnerCloningTrainer {
     }
 }
 
-/// Returns the mean log-likelihood of choices, nats, and how often network and rules agree with them. Among
-/// choices of a target, it also returns how often the most probable target and the nearest wanted one agree.
+/// Returns the mean log-likelihood of choices, nats, and how often network, rules and the nearest wanted
+/// target agree with them: among all choices, and among choices of a target.
 fn imitation_metrics(
     model: &CandidateScorer,
     parameters: &[f32],
     decisions: &[PartnerDecision],
 ) -> Metrics {
     let mut pass = model.pass();
-    let (mut log_likelihood, mut n_targets) = (0.0, 0.0);
-    let [mut by_network, mut by_rules, mut target_by_network, mut target_by_nearest] = [0.0; 4];
+    let (mut log_likelihood, mut n_picks) = (0.0, 0.0);
+    let [mut network, mut rules, mut pick_network, mut pick_rules, mut pick_nearest] = [0.0; 5];
     for decision in decisions {
-        let PartnerDecision { observation, action, rules_action, .. } = decision;
-        let output = model.forward(parameters, std::iter::once(observation), &mut pass).remove(0);
-        let agrees = |chosen: Option<usize>| f64::from(u8::from(chosen == Some(*action)));
-        log_likelihood += f64::from(output.log_probs[*action]);
-        by_network += agrees(Some(output.argmax()));
-        by_rules += agrees(*rules_action);
+        let observations = std::iter::once(&decision.observation);
+        let output = model.forward(parameters, observations, &mut pass).remove(0);
+        let agrees = |action: Option<usize>| f64::from(u8::from(action == Some(decision.action)));
+        let (by_network, by_rules) = (agrees(Some(output.argmax())), agrees(decision.rules_action));
+        log_likelihood += f64::from(output.log_probs[decision.action]);
+        network += by_network;
+        rules += by_rules;
         if decision.is_pick {
-            let log_prob = |k: &usize| output.log_probs[*k];
-            let targets = pick_ups(observation).into_iter();
-            let probable = targets.max_by(|a, b| log_prob(a).total_cmp(&log_prob(b)));
-            n_targets += 1.0;
-            target_by_network += agrees(probable);
-            target_by_nearest += agrees(nearest_wanted(observation));
+            n_picks += 1.0;
+            pick_network += by_network;
+            pick_rules += by_rules;
+            pick_nearest += agrees(nearest_wanted(&decision.observation));
         }
     }
     let n = decisions.len().max(1) as f64;
-    let n_targets_or_one = f64::max(n_targets, 1.0);
+    let n_targets = f64::max(n_picks, 1.0);
     metrics([
         (LOG_LIKELIHOOD, log_likelihood / n),
-        ("accuracy", by_network / n),
-        ("accuracy_of_rules", by_rules / n),
-        ("target_accuracy", target_by_network / n_targets_or_one),
-        ("target_accuracy_of_nearest", target_by_nearest / n_targets_or_one),
+        ("accuracy", network / n),
+        ("accuracy_of_rules", rules / n),
+        ("target_accuracy", pick_network / n_targets),
+        ("target_accuracy_of_rules", pick_rules / n_targets),
+        ("target_accuracy_of_nearest", pick_nearest / n_targets),
         ("choices", decisions.len() as f64),
-        ("target_choices", n_targets),
+        ("target_choices", n_picks),
     ])
 }

@@ -272,6 +272,11 @@ pub trait Policy: Send + 'static {
         None
     }
 
+    /// Returns the digest of the recording that the policy repeats, if it repeats one.
+    fn recording(&self) -> Option<String> {
+        None
+    }
+
     /// Counters of this episode, by name.
     fn counters(&self) -> BTreeMap<String, u64> {
         BTreeMap::new()

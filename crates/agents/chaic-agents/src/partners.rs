@@ -1,5 +1,7 @@
 //! Simulated people. They are part of the benchmark's definition: a change to them moves scores.
 
+use std::sync::Arc;
+
 use chaic_core::Agent;
 use chaic_core::capability::Persona;
 use chaic_core::observation::Grants;
@@ -11,7 +13,8 @@ pub use crate::policies::{
     FetchOrder, HabitsError, PARTNER_VARIANTS, PartnerHabits, PartnerVariant, partner_habits,
     recorded_partner_name,
 };
-use crate::policies::{PartnerVariantPolicy, RulePolicy, RuleProfile};
+use crate::policies::{PartnerVariantPolicy, RecordedPolicy, RulePolicy, RuleProfile};
+pub use crate::policies::{PlanRecording, RecordedInteraction, RecordedStep, is_real_failure};
 use crate::rules::PlannerRules;
 
 /// Grants of a partner: perfect segmentation and its own goal.
@@ -36,6 +39,11 @@ pub fn partner(persona: Persona, scene: SceneKind, rules: PlannerRules) -> Box<d
 /// Constructs the agent of a partner that deviates from the rules.
 pub fn partner_variant(habits: PartnerHabits, rules: PlannerRules) -> Box<dyn Agent> {
     Box::new(PlanningAgent::new(PartnerVariantPolicy::new(habits), rules))
+}
+
+/// Constructs the agent of a partner that repeats a recording.
+pub fn recorded_partner(recording: Arc<PlanRecording>, rules: PlannerRules) -> Box<dyn Agent> {
+    Box::new(PlanningAgent::new(RecordedPolicy::new(recording), rules))
 }
 
 /// Returns the grants of a task's partner under these rules.

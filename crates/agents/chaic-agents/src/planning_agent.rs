@@ -415,6 +415,10 @@ impl<P: Policy> Agent for PlanningAgent<P> {
         self.policy.weights()
     }
 
+    fn recording(&self) -> Option<String> {
+        self.policy.recording()
+    }
+
     fn thought(&self) -> Thought {
         Thought {
             plan: self.plan().map_or_else(|| "think".to_owned(), |plan| plan.to_string()),

@@ -6,6 +6,7 @@ mod infer;
 mod partner_habits;
 mod partner_variant;
 mod random;
+mod recorded;
 mod rule_policy;
 
 pub use external::ExternalPolicy;
@@ -16,6 +17,9 @@ pub use partner_variant::{
     PARTNER_VARIANTS, PartnerVariant, PartnerVariantPolicy, partner_habits, recorded_partner_name,
 };
 pub use random::RandomPolicy;
+pub use recorded::{
+    PlanRecording, RecordedInteraction, RecordedPolicy, RecordedStep, is_real_failure,
+};
 pub use rule_policy::RulePolicy;
 
 pub use crate::rules::{RuleProfile, TargetFilter, TargetOrder};

@@ -96,6 +96,7 @@ impl<'a> EpisodeConfig<'a> {
                     perception: slot.agent().and_then(|agent| agent.perception()),
                     isolation: slot.agent().and_then(|agent| agent.isolation()),
                     weights: slot.agent().and_then(|agent| agent.weights()),
+                    recording: slot.agent().and_then(|agent| agent.recording()),
                     input: None,
                 })
                 .collect(),

@@ -100,6 +100,22 @@ pub enum EnvError {
         /// The name, and the problem with its parameters.
         problem: String,
     },
+    /// A partner comes from a file that was not given.
+    #[error(
+        "the partner `{name}` comes from a file; give it with --partner recorded:PATH or policy:FILE"
+    )]
+    PartnerFile {
+        /// Name in the run, with the digest of the file.
+        name: String,
+    },
+    /// A trace can't be repeated by a partner, or a folder has no such traces.
+    #[error("{}: {problem}", path.display())]
+    Recording {
+        /// File or folder.
+        path: PathBuf,
+        /// The problem, in one line.
+        problem: String,
+    },
     /// A list of partners is wrong.
     #[error("{source_name}: not a list of partners: {problem}")]
     Partners {
@@ -156,13 +172,14 @@ impl EnvError {
     /// Returns whether the caller's arguments caused the error.
     pub fn is_usage(&self) -> bool {
         use EnvError::{
-            InvalidPartner, Partners, Rule, UnknownHelper, UnknownPartner, UnknownRule,
+            InvalidPartner, PartnerFile, Partners, Rule, UnknownHelper, UnknownPartner, UnknownRule,
         };
         matches!(
             self,
             UnknownHelper { .. }
                 | UnknownPartner { .. }
                 | InvalidPartner { .. }
+                | PartnerFile { .. }
                 | Partners { .. }
                 | UnknownRule { .. }
                 | Rule { .. }

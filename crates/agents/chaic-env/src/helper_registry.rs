@@ -1,5 +1,6 @@
 //! Registries that create helpers and partners by name.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -9,6 +10,7 @@ use chaic_agents::{HELPERS, HelperInfo, PlannerRules};
 use chaic_core::Agent;
 use chaic_core::observation::Grants;
 
+use crate::digest::Digest;
 use crate::error::{EnvError, Result};
 use crate::key::RunKey;
 
@@ -16,6 +18,12 @@ use crate::key::RunKey;
 pub const NONE: &str = "none";
 /// Name of the rule-based partners.
 pub const RULES: &str = "rules";
+/// Prefix of a partner that repeats recordings: `recorded:PATH` in commands, `recorded:DIGEST` in runs.
+pub const RECORDED: &str = "recorded:";
+/// Prefix of a partner with trained weights: `policy:FILE` in commands, `policy:DIGEST` in runs.
+pub const POLICY: &str = "policy:";
+/// Prefixes of partners from files. Runs name them by digest, so they need the files again to resume.
+pub const PARTNER_FILES: [&str; 2] = [RECORDED, POLICY];
 
 /// A helper and its grants.
 pub struct Helper {
@@ -70,6 +78,12 @@ pub trait HelperRegistry: Sync {
             Some(registry) => registry.partner(name, key, rules),
             None => built_in_partner(name, rules),
         }
+    }
+
+    /// Returns the episodes that the partner can play, with the digests of their setups; `None` for a
+    /// partner that can play any.
+    fn partner_episodes(&self, name: &str) -> Option<BTreeMap<String, Digest>> {
+        self.fallback()?.partner_episodes(name)
     }
 
     /// Returns the number of concurrent episode runs with [slow](HelperRegistry::is_slow) agents, in
@@ -202,6 +216,9 @@ pub fn find_partner(
     let Some(name) = name else { return Ok(None) };
     let known = || std::iter::once(RULES.to_owned()).chain(helpers.partner_names()).collect();
     let unknown = || match partners::partner_habits(name) {
+        _ if PARTNER_FILES.iter().any(|prefix| name.starts_with(prefix)) => {
+            EnvError::PartnerFile { name: name.to_owned() }
+        }
         Err(HabitsError::Invalid(problem)) => EnvError::InvalidPartner { problem },
         _ => EnvError::UnknownPartner { name: name.to_owned(), known: known() },
     };

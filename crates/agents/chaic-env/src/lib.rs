@@ -57,6 +57,7 @@ pub mod narration;
 mod observer;
 pub mod partner_suite;
 mod playback;
+pub mod recording;
 mod reseeded;
 mod reward;
 pub mod rules;

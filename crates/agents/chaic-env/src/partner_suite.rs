@@ -68,7 +68,7 @@ const fn body(name: &'static str, person: &'static str) -> BundledPartner {
 }
 
 /// Partners of the bundled suite. Every partner can play every task.
-static BUNDLED: [BundledPartner; 12] = [
+static BUNDLED: [BundledPartner; 13] = [
     mind("farthest"),
     mind("shuffled"),
     mind("noisy"),
@@ -76,6 +76,8 @@ static BUNDLED: [BundledPartner; 12] = [
     mind("no_containers"),
     mind("forgetful"),
     mind("one_by_one"),
+    // The registry of chaic-learn creates it.
+    mind("cloned"),
     body("fast_walker", "+speed150"),
     body("slow_walker", "+speed65"),
     body("tires_trembles", "+tires+tremor"),

@@ -49,6 +49,10 @@ impl Agent for Reseeded {
         self.agent.weights()
     }
 
+    fn recording(&self) -> Option<String> {
+        self.agent.recording()
+    }
+
     fn thought(&self) -> Thought {
         self.agent.thought()
     }

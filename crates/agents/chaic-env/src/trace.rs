@@ -141,6 +141,9 @@ pub struct Participant {
     /// Digest of its weights; absent for an agent without trained weights.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weights: Option<String>,
+    /// Digest of the recording that it repeats; absent for an agent that repeats none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recording: Option<String>,
     /// Level of the decisions if a person controls it, `plans` or `steps`; absent for a program.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub input: Option<String>,

@@ -33,6 +33,7 @@ mod bars;
 mod datasets;
 mod eval_partners;
 mod eval_session;
+mod given_partners;
 mod recorded;
 mod run_perception;
 mod sealed;
@@ -46,8 +47,8 @@ use anyhow::Result;
 use chaic_episodes::{Episode, find_episode};
 use chaic_eval::{EvalError, read_episode_file};
 use chaic_files::write_atomically;
-use chaic_learn::bundled::BundledHelper;
-use chaic_llm::language::helper_names;
+use chaic_learn::bundled::{BundledHelper, BundledPartner};
+use chaic_llm::language::{helper_names, partner_names};
 use comfy_table::{ContentArrangement, Table, presets};
 use serde::Serialize;
 
@@ -70,6 +71,12 @@ fn episode(argument: &str) -> Result<Episode> {
 fn all_helper_names() -> Vec<String> {
     let bundled = BundledHelper::all().iter().map(|helper| helper.name.to_owned());
     helper_names().into_iter().chain(bundled).collect()
+}
+
+/// Returns the names of all partners except `rules`; built-in ones come first.
+fn all_partner_names() -> Vec<String> {
+    let bundled = BundledPartner::all().iter().map(|partner| partner.name.to_owned());
+    partner_names().into_iter().chain(bundled).collect()
 }
 
 /// Returns the number of threads: as given, or one per core.

@@ -140,6 +140,11 @@ pub trait Agent: Send {
         None
     }
 
+    /// Returns the digest of the recording that the agent repeats, if it repeats one; for the trace.
+    fn recording(&self) -> Option<String> {
+        None
+    }
+
     /// Returns a description of the internal state, for the trace.
     fn thought(&self) -> Thought {
         Thought::default()

@@ -266,6 +266,11 @@ impl NewRun {
         if episodes.is_none() && options.partner_is.is_some() {
             plan::check_partner(&planned)?;
         }
+        if let Some(name) = &options.partner
+            && let Some(playable) = helpers.partner_episodes(name)
+        {
+            plan::check_recorded(&planned, episodes.as_deref(), &playable)?;
+        }
         Ok(NewRun { options, planned, episodes })
     }
 

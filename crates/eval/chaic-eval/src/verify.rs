@@ -437,6 +437,9 @@ impl TraceVerifier<'_> {
                 // The weights may have changed since.
                 expected.perception.clone_from(&actual.perception);
             }
+            if !is_helper && expected.weights.is_some() == actual.weights.is_some() {
+                expected.weights.clone_from(&actual.weights);
+            }
             let is_unknown_agent = is_unknown.get(expected.agent.index()).is_some_and(|u| *u);
             if is_helper && (is_unknown_agent || expected.weights.is_some()) {
                 expected.weights = of_run(|granted| &granted.weights);
@@ -444,9 +447,12 @@ impl TraceVerifier<'_> {
             if is_unknown_agent {
                 expected.grants = recorded.unwrap_or(actual.grants);
                 expected.sensors = actual.sensors;
+                expected.recording.clone_from(&actual.recording);
                 expected.perception.clone_from(&actual.perception);
                 if is_helper {
                     expected.isolation = of_run(|granted| &granted.isolation);
+                } else {
+                    expected.weights.clone_from(&actual.weights);
                 }
             } else if recorded.is_some_and(|grants| grants != expected.grants) {
                 return Some(format!(

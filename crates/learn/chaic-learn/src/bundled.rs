@@ -1,4 +1,4 @@
-//! Helpers whose trained weights are part of chaic. Their model cards are in `weights/README.md`.
+//! Helpers and partners whose trained weights are part of chaic. Their model cards are in `weights/README.md`.
 
 use std::sync::{Arc, LazyLock};
 
@@ -8,6 +8,7 @@ use chaic_core::TaskId;
 use chaic_core::observation::Grants;
 
 use crate::loaded_policy::LoadedPolicy;
+use crate::partner::policy::PartnerWeights;
 use crate::visual::helper::{VisualPolicies, VisualWeights};
 
 /// Table entry of a helper with bundled weights.
@@ -89,6 +90,41 @@ static BUNDLED_HELPERS: [BundledHelper; 5] = [
         policy: policy!("smart_help_plus"),
     },
 ];
+
+/// Table entry of a partner with bundled weights.
+pub struct BundledPartner {
+    /// Name in commands and files.
+    pub name: &'static str,
+    /// Description in a few words, for lists.
+    pub about: &'static str,
+    weights: LazyLock<Arc<PartnerWeights>>,
+}
+
+/// All bundled partners.
+static BUNDLED_PARTNERS: [BundledPartner; 1] = [BundledPartner {
+    name: "cloned",
+    about: "chooses its plans by a network that imitates partners with drawn habits",
+    weights: LazyLock::new(|| {
+        let weights = PartnerWeights::from_bytes(weights_file!("partner"));
+        Arc::new(weights.expect("bundled weights are valid"))
+    }),
+}];
+
+impl BundledPartner {
+    /// Returns all bundled partners.
+    pub fn all() -> &'static [BundledPartner] {
+        &BUNDLED_PARTNERS
+    }
+
+    /// Returns the partner with this name.
+    pub fn find(name: &str) -> Option<&'static BundledPartner> {
+        BUNDLED_PARTNERS.iter().find(|partner| partner.name == name)
+    }
+
+    pub(crate) fn weights(&self) -> &Arc<PartnerWeights> {
+        &self.weights
+    }
+}
 
 impl BundledHelper {
     /// Returns all bundled helpers.

@@ -1,4 +1,4 @@
-//! Trained policies as named helpers of a run.
+//! Trained policies as named helpers and partners of a run.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,13 +7,14 @@ use std::sync::Arc;
 use chaic_agents::PlannerRules;
 use chaic_agents::perception_factory::PerceptionFactory;
 use chaic_core::TaskId;
-use chaic_env::helper_registry::{Helper, HelperRegistry, check_new_name};
+use chaic_env::helper_registry::{Helper, HelperRegistry, POLICY, check_new_name};
 use chaic_env::{EnvError, RunKey};
 use chaic_files::{EntryKind, FileError, kind, read_user_file};
 use chaic_nn::weights::WeightsError;
 
-use crate::bundled::BundledHelper;
+use crate::bundled::{BundledHelper, BundledPartner};
 use crate::loaded_policy::LoadedPolicy;
+use crate::partner::policy::PartnerWeights;
 use crate::visual::helper::{VisualPolicies, VisualWeights};
 
 /// Maximum size of a weights file, bytes.
@@ -71,6 +72,31 @@ impl NamedPolicy {
     }
 }
 
+/// Trained policy of a partner.
+pub struct PartnerPolicy {
+    name: String,
+    weights: Arc<PartnerWeights>,
+}
+
+impl PartnerPolicy {
+    /// Reads the policy of a partner from a weights file.
+    ///
+    /// # Errors
+    /// If the file cannot be read or holds no policy of a partner.
+    pub fn read(path: &Path) -> chaic_env::Result<PartnerPolicy> {
+        let bytes = read_user_file(path, MAX_BYTES).map_err(PolicyError::from)?;
+        let weights_error = |problem| PolicyError::Weights { path: path.to_owned(), problem };
+        let weights = PartnerWeights::from_bytes(&bytes).map_err(weights_error)?;
+        let digest = weights.digest.clone().expect("it is from a file");
+        Ok(PartnerPolicy { name: format!("{POLICY}{digest}"), weights: Arc::new(weights) })
+    }
+
+    /// Name of the partner in runs: `policy:` and the digest of its weights.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+}
+
 /// Reads one visual policy per task.
 fn read_folder(folder: &Path) -> Result<VisualPolicies, PolicyError> {
     let path_of = |task: TaskId| folder.join(format!("{task}.{EXTENSION}"));
@@ -94,6 +120,7 @@ fn read_folder(folder: &Path) -> Result<VisualPolicies, PolicyError> {
 /// Registry of bundled and given policies, with another registry as fallback.
 pub struct PolicyRegistry<'a> {
     policies: Vec<NamedPolicy>,
+    partners: &'a [PartnerPolicy],
     fallback: &'a dyn HelperRegistry,
     perception: Arc<dyn PerceptionFactory>,
 }
@@ -104,7 +131,12 @@ impl<'a> PolicyRegistry<'a> {
         fallback: &'a dyn HelperRegistry,
         perception: Arc<dyn PerceptionFactory>,
     ) -> PolicyRegistry<'a> {
-        PolicyRegistry { policies: Vec::new(), fallback, perception }
+        PolicyRegistry { policies: Vec::new(), partners: &[], fallback, perception }
+    }
+
+    /// Adds policies as partners.
+    pub fn with_partners(self, partners: &'a [PartnerPolicy]) -> PolicyRegistry<'a> {
+        PolicyRegistry { partners, ..self }
     }
 
     /// Adds policies as helpers.
@@ -152,5 +184,19 @@ impl HelperRegistry for PolicyRegistry<'_> {
 
     fn fallback(&self) -> Option<&dyn HelperRegistry> {
         Some(self.fallback)
+    }
+
+    fn partner_names(&self) -> Vec<String> {
+        let bundled = BundledPartner::all().iter().map(|partner| partner.name.to_owned());
+        self.fallback.partner_names().into_iter().chain(bundled).collect()
+    }
+
+    fn partner(&self, name: &str, key: Option<&RunKey>, rules: PlannerRules) -> Option<Helper> {
+        let given = self.partners.iter().find(|partner| partner.name == name);
+        let given = given.map(|partner| &partner.weights);
+        match given.or_else(|| BundledPartner::find(name).map(BundledPartner::weights)) {
+            Some(weights) => Some(weights.partner(rules)),
+            None => self.fallback.partner(name, key, rules),
+        }
     }
 }

@@ -6,7 +6,7 @@
 //! it. [`policy`] lets a
 //! network drive an agent, [`policy_kind`] lists networks by their inputs, and [`rollout`] plays
 //! episodes. [`cloning`] learns from an expert whose choices [`demonstrations`] keeps, and [`train`]
-//! has the trainers. [`visual`] has policies that read images.
+//! has the trainers. [`visual`] has policies that read images, [`partner`] those of partners.
 //! [`helpers`] makes either a helper of a run, and [`bundled`] lists those that are part of chaic.
 //! [`toy`] has tasks with a known best return, which
 //! test the learner.
@@ -40,6 +40,8 @@ pub mod rollout_config;
 pub mod train;
 
 pub mod visual;
+
+pub mod partner;
 
 pub mod bundled;
 pub mod helpers;

@@ -28,6 +28,7 @@ fn header() -> Header {
             perception: None,
             isolation: None,
             weights: None,
+            recording: None,
             input: None,
             agent: AgentId::PARTNER,
             persona: Persona::Wheelchair,

@@ -75,8 +75,8 @@ pub struct EvalArguments {
     /// Episodes in parallel, 1 to 1024; does not change results [default: one per core].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(ranges::JOBS))]
     pub jobs: Option<u16>,
-    /// Agent that controls the partner; `chaic list partners` prints the names. Also drawn:SEED or habits:...;
-    /// docs/people.md [default: rules].
+    /// Agent that controls the partner; `chaic list partners` prints the names. Also drawn:SEED, habits:...,
+    /// recorded:PATH (a trace or a folder of traces) or policy:FILE; docs/people.md [default: rules].
     #[arg(long, value_name = "NAME")]
     pub partner: Option<String>,
     #[arg(long, alias = "partner-is", value_name = "KIND", help = person_help())]

@@ -22,6 +22,8 @@ pub enum TrainCommand {
     /// Train a policy that reads images, as in the paper.
     #[command(alias = "primitive")]
     Visual(TrainArguments),
+    /// Train the policy of a partner by behavior cloning of other partners, simulated or recorded.
+    Partner(TrainArguments),
     /// Train the opponent model, which infers the partner's goal and limits.
     Opponent(TrainArguments),
 }

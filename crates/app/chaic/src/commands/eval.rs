@@ -10,10 +10,11 @@ use chaic_sandbox::Launcher;
 
 use super::eval_partners;
 use super::eval_session::{Played, Session, free_folder, request, write_reports};
+use super::given_partners::{GivenPartners, is_partner_file};
 use super::summary::{print_scores, report_of};
 use crate::arguments::EvalArguments;
 use crate::exit::ExitStatus;
-use crate::output::{OutputFormat, counted, print_error, quoted_path};
+use crate::output::{OutputFormat, counted, print_error, quoted, quoted_path};
 
 /// Plays a benchmark.
 pub fn run(
@@ -25,12 +26,17 @@ pub fn run(
     if arguments.partners.is_some() || resumed.is_some_and(SuiteFolder::is_suite) {
         return eval_partners::run(arguments, format, launcher);
     }
+    let mut given = GivenPartners::default();
+    let partner = arguments.partner.as_deref().map(|name| given.resolve(name)).transpose()?;
+    let hint = arguments.partner.as_deref().filter(|name| is_partner_file(name));
+    let hint = hint.map_or(String::new(), |name| format!(" --partner {}", quoted(name)));
+    let arguments = &EvalArguments { partner, ..arguments.clone() };
     let (request, name) = request(arguments);
     let path = arguments.out.clone().map_or_else(|| free_folder(name), Ok)?;
     if arguments.resume {
         RunFolder::check_started(&path)?;
     }
-    let session = Session::new(arguments, launcher)?;
+    let session = Session::new(arguments, launcher, given, hint)?;
     let start = Instant::now();
     match session.play(arguments, &path, &request, None)? {
         Played::Whole(run) => finish(&run, format, start),

@@ -15,9 +15,12 @@ use chaic_sandbox::Launcher;
 use serde_json::json;
 
 use super::eval_session::{Played, Session, free_folder, request, write_reports};
+use super::given_partners::GivenPartners;
 use crate::arguments::{EvalArguments, LanguageArguments};
 use crate::exit::ExitStatus;
-use crate::output::{OutputFormat, counted, print_error, print_result, print_warning, quoted_path};
+use crate::output::{
+    OutputFormat, counted, print_error, print_result, print_warning, quoted, quoted_path,
+};
 
 /// Plays a benchmark with several partners.
 ///
@@ -28,9 +31,12 @@ pub(super) fn run(
     format: OutputFormat,
     launcher: &Launcher,
 ) -> Result<ExitStatus> {
-    let given = arguments.partners.as_deref().map(read_partners).transpose()?;
+    let mut files = GivenPartners::default();
+    let list = arguments.partners.as_deref();
+    let given = list.map(|list| read_partners(list, &mut files)).transpose()?;
     let path = arguments.out.clone().map_or_else(|| free_folder("partners"), Ok)?;
-    let session = Session::new(arguments, launcher)?;
+    let options = list.map_or(String::new(), |list| format!(" --partners {}", quoted(list)));
+    let session = Session::new(arguments, launcher, files, options)?;
     let start = Instant::now();
     let folder = match given {
         Some(suite) if !arguments.resume => start_runs(&session, arguments, &path, suite)?,
@@ -67,7 +73,10 @@ pub(super) fn run(
 }
 
 /// Returns the bundled suite, or the list in a file.
-fn read_partners(list: &str) -> Result<PartnerSuite> {
+///
+/// # Errors
+/// If the list or a file that it names can't be read.
+fn read_partners(list: &str, files: &mut GivenPartners) -> Result<PartnerSuite> {
     if list == SUITE {
         return Ok(PartnerSuite::bundled());
     }
@@ -76,7 +85,13 @@ fn read_partners(list: &str) -> Result<PartnerSuite> {
         let text = format!("--partners {list}: no such file; give `{SUITE}` or a list of partners");
         return Err(EvalError::Options(text).into());
     }
-    Ok(PartnerSuite::parse(&read_user_file(path, MAX_FILE_BYTES)?, list)?)
+    let suite = PartnerSuite::parse(&read_user_file(path, MAX_FILE_BYTES)?, list)?;
+    let mut partners = suite.partners().to_vec();
+    for entry in &mut partners {
+        let name = entry.partner.as_deref();
+        entry.partner = name.map(|name| files.resolve(name)).transpose()?;
+    }
+    PartnerSuite::new(partners).map_err(|problem| EvalError::Options(problem).into())
 }
 
 /// Starts a run per partner. Nothing is written if one of them is not possible.

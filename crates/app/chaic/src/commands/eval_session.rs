@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context as _, Result, anyhow, bail};
 use chaic_env::helper_registry::{BuiltInWithPerception, HelperRegistry};
+use chaic_env::recording::RecordedPartners;
 use chaic_eval::report::write_files;
 use chaic_eval::run::{FolderMode, Run, RunRequest, Shard};
 use chaic_learn::helpers::{NamedPolicy, PolicyRegistry};
@@ -14,6 +15,7 @@ use chaic_page::write_report;
 use chaic_sandbox::Launcher;
 use chaic_subprocess::{CommandRegistry, HelperProgram};
 
+use super::given_partners::GivenPartners;
 use super::summary::report_of;
 use super::{bars::RunBars, jobs, llm, run_perception, start_threads};
 use crate::arguments::{EvalArguments, ExecArguments, HelperArgument};
@@ -29,6 +31,10 @@ pub(super) struct Session<'a> {
     stop: &'static AtomicBool,
     jobs: usize,
     pub shard: Shard,
+    /// Partners from files.
+    partners: GivenPartners,
+    /// Options that name them, which a resumed run needs again.
+    partner_options: String,
 }
 
 /// A run after it was played.
@@ -42,16 +48,22 @@ pub(super) enum Played {
 }
 
 impl<'a> Session<'a> {
-    /// Starts the threads. A process has one session.
+    /// Starts the threads. A process has one session. `partner_options` name the partners from files.
     ///
     /// # Errors
     /// If the system refuses the threads.
-    pub fn new(arguments: &EvalArguments, launcher: &'a Launcher) -> Result<Session<'a>> {
+    pub fn new(
+        arguments: &EvalArguments,
+        launcher: &'a Launcher,
+        partners: GivenPartners,
+        partner_options: String,
+    ) -> Result<Session<'a>> {
         let stop = interrupt::stop_flag()?;
         let jobs = jobs(arguments.jobs);
         start_threads(jobs)?;
         hide_worker_panics();
-        Ok(Session { launcher, stop, jobs, shard: arguments.shard.unwrap_or(Shard::WHOLE) })
+        let shard = arguments.shard.unwrap_or(Shard::WHOLE);
+        Ok(Session { launcher, stop, jobs, shard, partners, partner_options })
     }
 
     /// Plays the run in a folder. `part` names it among the runs of the command.
@@ -82,7 +94,7 @@ impl<'a> Session<'a> {
             });
             bars.clear();
             let folder = part.and(path.parent()).unwrap_or(path);
-            let resume = how_to_resume(folder, arguments);
+            let resume = how_to_resume(folder, arguments, &self.partner_options);
             let is_complete = played.map_err(|e| anyhow!("{e:#}\n{resume}"))?;
             if let Some(problem) = language.and_then(LanguageHelpers::problem) {
                 bail!("paused: {problem}\n{resume}");
@@ -124,7 +136,9 @@ impl<'a> Session<'a> {
         let policies: chaic_env::Result<Vec<NamedPolicy>> =
             arguments.policies().map(|(name, file)| NamedPolicy::read(name, file)).collect();
         let policies = PolicyRegistry::bundled(registry, Arc::clone(&built_in.perception))
+            .with_partners(&self.partners.policies)
             .with_policies(policies?)?;
+        let policies = RecordedPartners::new(&policies, &self.partners.recordings);
         let processes = confined(arguments, path, self.launcher)?;
         let commands = CommandRegistry::new(&policies, processes, self.stop)?;
         if arguments.resume {
@@ -221,12 +235,12 @@ pub(super) fn free_folder(name: &str) -> Result<PathBuf> {
 }
 
 /// Returns the command that continues a run.
-fn how_to_resume(path: &Path, arguments: &EvalArguments) -> String {
+fn how_to_resume(path: &Path, arguments: &EvalArguments, partner_options: &str) -> String {
     let language = llm::resume_options(&arguments.language);
     let helpers = resume_options(arguments);
     let shard = arguments.shard.map_or_else(String::new, |shard| format!(" --shard {shard}"));
     format!(
-        "continue with: chaic eval --resume --out {}{shard}{helpers}{language}",
+        "continue with: chaic eval --resume --out {}{shard}{partner_options}{helpers}{language}",
         quoted_path(path)
     )
 }

@@ -15,12 +15,11 @@ use chaic_eval::report::title;
 use chaic_eval::run::{RunFolder, planned, read_results};
 use chaic_eval::suite::SuiteFolder;
 use chaic_files::entries;
-use chaic_learn::bundled::BundledHelper;
-use chaic_llm::language::partner_names;
+use chaic_learn::bundled::{BundledHelper, BundledPartner};
 use comfy_table::ContentArrangement;
 use serde_json::{Value, json};
 
-use super::{all_helper_names, table};
+use super::{all_helper_names, all_partner_names, table};
 use crate::arguments::ListCommand;
 use crate::exit::ExitStatus;
 use crate::output::{OutputFormat, print_result};
@@ -131,12 +130,13 @@ fn people(format: OutputFormat) -> Result<()> {
 fn partners(format: OutputFormat) -> Result<()> {
     let mut rows = Vec::new();
     let mut minds = table(["Name", "The partner ..."]);
-    for name in [RULES.to_owned()].into_iter().chain(partner_names()) {
+    for name in [RULES.to_owned()].into_iter().chain(all_partner_names()) {
+        let bundled = BundledPartner::find(&name).map_or("", |partner| partner.about);
         let description = match name.as_str() {
             RULES => "follows the rules of the paper",
             "llm" => "asks a language model, with text",
             "vlm" => "asks a language model, with text and images",
-            name => PartnerVariant::find(name).map_or("", |variant| variant.about),
+            name => PartnerVariant::find(name).map_or(bundled, |variant| variant.about),
         };
         minds.add_row([name.as_str(), description]);
         let habits = partner_habits(&name).ok().map(|habits| habits.to_string());
@@ -147,7 +147,8 @@ fn partners(format: OutputFormat) -> Result<()> {
         let person = person.map(|change| change.to_string()).unwrap_or_default();
         suite.add_row([name.as_str(), partner.as_deref().unwrap_or(RULES), &person]);
     }
-    let more = "`--partner NAME` selects one; also drawn:SEED and habits:.... `--person` selects the body.\n\
+    let more = "`--partner NAME` selects one; also drawn:SEED, habits:..., recorded:PATH (a trace or a folder)\n\
+                and policy:FILE (weights of `chaic train partner`). `--person` selects the body.\n\
                 `--partners suite` plays all of the second table. docs/people.md.\n";
     let text = format!("{}\n{}\n{more}", minds.trim_fmt(), suite.trim_fmt());
     print_result(format, &rows, &text)

@@ -12,16 +12,15 @@ use chaic_eval::EvalError;
 use chaic_eval::replay::find_trace;
 use chaic_eval::run::RunFolder;
 use chaic_llm::endpoint_preset::EndpointPreset;
-use chaic_llm::language::{
-    LanguageHelpers, is_language_helper, is_language_partner, partner_names,
-};
+use chaic_llm::language::{LanguageHelpers, is_language_helper, is_language_partner};
 use chaic_llm::settings::Settings;
 use chaic_llm::show::{self, Detail};
 use chaic_llm::templates::Templates;
 use chaic_llm::{check, session};
 use serde_json::json;
 
-use super::{all_helper_names, require_text};
+use super::given_partners::is_partner_file;
+use super::{all_helper_names, all_partner_names, require_text};
 use crate::arguments::{EvalArguments, LanguageArguments, LlmCommand};
 use crate::exit::ExitStatus;
 use crate::output::{OutputFormat, print, print_result, print_warning, quoted};
@@ -139,8 +138,9 @@ fn check_names(arguments: &EvalArguments) -> Result<(), EnvError> {
     if let Some(name) = helpers.find(|name| !valid.contains(name)) {
         return Err(EnvError::UnknownHelper { name, known });
     }
-    let known: Vec<String> = [RULES.to_owned()].into_iter().chain(partner_names()).collect();
-    let Some(name) = arguments.partner.clone().filter(|name| !known.contains(name)) else {
+    let known: Vec<String> = [RULES.to_owned()].into_iter().chain(all_partner_names()).collect();
+    let unlisted = arguments.partner.clone().filter(|name| !known.contains(name));
+    let Some(name) = unlisted.filter(|name| !is_partner_file(name)) else {
         return Ok(());
     };
     match partner_habits(&name) {

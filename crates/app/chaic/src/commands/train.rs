@@ -9,6 +9,7 @@ use anyhow::Result;
 use chaic_eval::curves::{Curve, draw};
 use chaic_files::read_bounded;
 use chaic_learn::opponent::train::OpponentTrainer;
+use chaic_learn::partner::train::PartnerCloningTrainer;
 use chaic_learn::train::{CloningConfig, PolicyTrainer, PpoTrainingConfig};
 use chaic_learn::visual::train::VisualTrainer;
 use chaic_training::{CURVES, CurveRecord, Phase, Trainer, TrainingRun, read_config_with};
@@ -51,6 +52,13 @@ pub fn run(command: &TrainCommand, format: OutputFormat) -> Result<ExitStatus> {
         TrainCommand::Clone(arguments) => {
             let names = CommandNames::for_policy("clone");
             train::<PolicyTrainer<CloningConfig>>(&names, arguments, format, |config, n| {
+                config.iterations = n;
+            })
+        }
+        TrainCommand::Partner(arguments) => {
+            let evaluate = "chaic eval --partner policy:FILE".to_owned();
+            let names = CommandNames { train: "partner", evaluate };
+            train::<PartnerCloningTrainer>(&names, arguments, format, |config, n| {
                 config.iterations = n;
             })
         }

@@ -78,7 +78,7 @@ fn lists_name_everything_that_options_take() {
         assert!(!refused.contains("unknown helper"), "{refused}");
     }
     let partners = names("partners");
-    assert_eq!(partners.len(), 10, "{partners:?}");
+    assert_eq!(partners.len(), 11, "{partners:?}");
     for partner in &partners {
         let refused = run_err(at, &["eval", "--partner", partner, "--first", "0", "--out", "r"]);
         assert!(!refused.contains("unknown partner"), "{refused}");

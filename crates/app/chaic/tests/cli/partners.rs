@@ -149,3 +149,55 @@ fn wrong_partners_are_refused_with_one_line() {
     assert!(run_err(at, &[&alone[..], &["--out", "s"]].concat()).contains("add none"));
     assert!(play(&["--partner", "habits:order=last"]).contains("nearest, farthest, random"));
 }
+
+#[test]
+fn a_recorded_partner_repeats_a_trace_and_is_named_by_its_digest() {
+    let dir = tempfile::tempdir().expect("the disk has space");
+    let at = dir.path();
+    let play = ["eval", "--task", "no_constraint", "--size", "64", "--helper", "none"];
+    let play = |more: &[&'static str]| [&play[..], more].concat();
+    let split = ["--split", "gen:12..13", "--out"];
+    run_ok(at, &play(&[&split[..], &["a", "--partner", "one_by_one"]].concat()));
+    let trace = "a/traces/no_constraint/none/gen-12-s0.jsonl";
+    for (out, partner) in
+        [("b", "recorded:a/traces/no_constraint/none/gen-12-s0.jsonl"), ("c", "recorded:a")]
+    {
+        run_ok(at, &play(&[&split[..], &[out, "--partner", partner]].concat()));
+    }
+    let header = |run: &str| {
+        let trace = read(&at.join(trace.replacen('a', run, 1)));
+        let header = trace.lines().next().expect("a header").to_owned();
+        serde_json::from_str::<serde_json::Value>(&header).expect("JSON")
+    };
+    let name = header("b")["partner"].as_str().expect("a name").to_owned();
+    let digest = name.strip_prefix("recorded:").expect("its kind").to_owned();
+    assert_eq!(header("b")["people"][0]["recording"], digest.as_str());
+    assert_eq!(header("b")["partner"], header("c")["partner"]);
+    assert!(read(&at.join("b/run.json")).contains(&name));
+    let scores = |run: &str| {
+        let results = read(&at.join(run).join("results.jsonl"));
+        let result: serde_json::Value = serde_json::from_str(&results).expect("JSON");
+        (result["done"].clone(), result["total"].clone())
+    };
+    assert_eq!(scores("a"), scores("b"), "it delivers what the recorded partner delivered");
+    // Verification needs the trace only.
+    fs::remove_dir_all(at.join("a")).expect("it exists");
+    run_ok(at, &["verify", "b"]);
+
+    // A resumed run needs the recording again, and other episodes are refused before the run begins.
+    let refused = run_err(at, &["eval", "--resume", "--out", "b"]);
+    assert!(refused.contains("comes from a file"), "{refused}");
+    let recorded = "recorded:b/traces/no_constraint/none/gen-12-s0.jsonl";
+    let other = ["--split", "gen:12..14", "--out", "d", "--partner", recorded];
+    let refused = run_err(at, &play(&other));
+    assert!(refused.contains("no recording of no_constraint/gen/13"), "{refused}");
+    assert!(!at.join("d").exists());
+    let body = ["--split", "gen:12..13", "--out", "d", "--person", "child", "--partner", recorded];
+    assert!(run_err(at, &play(&body)).contains("no recording of"));
+    for (partner, words) in
+        [("recorded:missing", "missing"), ("policy:b/run.json", "not a weights file")]
+    {
+        let refused = run_err(at, &play(&[&split[..], &["d", "--partner", partner]].concat()));
+        assert!(refused.contains(words) && refused.lines().count() <= 2, "{refused}");
+    }
+}

@@ -1,11 +1,11 @@
 //! Planning: the episode runs of a run.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use chaic_core::task::Origin;
 use chaic_core::{Frame, TaskId};
-use chaic_env::{RunKey, slug};
+use chaic_env::{Digest, RunKey, slug};
 use chaic_episodes::{Episode, Split, find_episode};
 use chaic_files::{create_folders_below, write_atomically};
 
@@ -81,6 +81,40 @@ pub(super) fn check_partner(jobs: &[EpisodeJob]) -> Result<()> {
     let mut tasks = BTreeSet::new();
     let mut first_jobs = jobs.iter().filter(|job| tasks.insert(job.key.task));
     first_jobs.try_for_each(|job| Ok(find_episode(&job.key.episode).map(|_| ())?))
+}
+
+/// Checks that the partner has a recording of every planned episode. `playable` has the digests of the
+/// setups of recorded episodes.
+///
+/// # Errors
+/// One line that names the first episode without a recording.
+pub(super) fn check_recorded(
+    jobs: &[EpisodeJob],
+    files: Option<&[Episode]>,
+    playable: &BTreeMap<String, Digest>,
+) -> Result<()> {
+    let planned: BTreeSet<&str> = jobs.iter().map(|job| job.key.episode.as_str()).collect();
+    for id in planned {
+        let recorded = playable.get(id).ok_or_else(|| {
+            let n = playable.len();
+            let first = playable.keys().next().map_or("", String::as_str);
+            let known =
+                if n == 1 { first.to_owned() } else { format!("{n} episodes, such as {first}") };
+            EvalError::Options(format!(
+                "the partner has no recording of {id}; it has one of {known}"
+            ))
+        })?;
+        let setup = match files {
+            Some(files) => files.iter().find(|e| e.id() == id).map(|e| Digest::of_setup(e.setup())),
+            None => Some(Digest::of_setup(find_episode(id)?.setup())),
+        };
+        if setup.is_some_and(|setup| setup != *recorded) {
+            return Err(EvalError::Options(format!(
+                "the recording of {id} is of another version of the episode; use the chaic that wrote it"
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// Returns the environments of planned episodes.

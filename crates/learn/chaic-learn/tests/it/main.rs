@@ -2,6 +2,7 @@
 
 mod old_keys;
 mod opponent;
+mod partner;
 mod policies;
 mod ppo_reference;
 mod training;

@@ -120,6 +120,17 @@ pub(super) const EXAMPLES: &[CommandExamples] = &[
         ],
     ),
     (
+        "chaic train partner",
+        [
+            ("Imitate partners with drawn habits", "chaic train partner --out runs/partner"),
+            (
+                "Imitate recorded people",
+                "chaic train partner --set 'recordings=\"data/traces\"' --out runs/people",
+            ),
+            ("Continue a training", "chaic train partner --resume --out runs/partner"),
+        ],
+    ),
+    (
         "chaic train opponent",
         [
             ("Train with the default configuration", "chaic train opponent --out runs/opponent"),

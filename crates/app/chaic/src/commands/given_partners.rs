@@ -1,0 +1,44 @@
+//! Partners from files: recorded people and trained policies.
+
+use std::path::Path;
+
+use anyhow::Result;
+use chaic_env::helper_registry::{PARTNER_FILES, POLICY, RECORDED};
+use chaic_env::recording::Recordings;
+use chaic_learn::helpers::PartnerPolicy;
+use chaic_learn::partner::recordings::read_recordings;
+
+/// Partners from files that a command names.
+#[derive(Default)]
+pub(super) struct GivenPartners {
+    pub recordings: Vec<Recordings>,
+    pub policies: Vec<PartnerPolicy>,
+}
+
+impl GivenPartners {
+    /// Reads the file of a partner and returns the partner's name in runs, which has a digest in place of
+    /// the path. Other names are returned unchanged.
+    ///
+    /// # Errors
+    /// If a file can't be read, or is of another kind.
+    pub fn resolve(&mut self, name: &str) -> Result<String> {
+        if let Some(path) = name.strip_prefix(RECORDED) {
+            let recordings = read_recordings(Path::new(path))?;
+            let name = recordings.to_string();
+            self.recordings.push(recordings);
+            return Ok(name);
+        }
+        if let Some(path) = name.strip_prefix(POLICY) {
+            let policy = PartnerPolicy::read(Path::new(path))?;
+            let name = policy.name().to_owned();
+            self.policies.push(policy);
+            return Ok(name);
+        }
+        Ok(name.to_owned())
+    }
+}
+
+/// Returns whether a partner comes from a file.
+pub(super) fn is_partner_file(name: &str) -> bool {
+    PARTNER_FILES.iter().any(|prefix| name.starts_with(prefix))
+}

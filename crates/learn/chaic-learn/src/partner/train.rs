@@ -1,0 +1,431 @@
+//! Training of a partner's policy by behavior cloning.
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use std::sync::atomic::AtomicBool;
+
+use chaic_agents::partners::PartnerHabits;
+use chaic_core::TaskId;
+use chaic_core::rng::RngStream;
+use chaic_env::Digest;
+use chaic_env::helper_registry::{BuiltInHelpers, HelperRegistry as _, NONE};
+use chaic_env::recording::Recording;
+use chaic_episodes::{SeedRange, find_episode};
+use chaic_nn::weights::{self, WeightsError};
+use chaic_nn::{AdamWConfig, Network};
+use chaic_training::bounds::{
+    ADAM, BoundTable, FRACTION, LEARNING_RATE, SEED, SHARDS, STEPS, integer,
+};
+use chaic_training::checkpoint::Identity;
+use chaic_training::{
+    Checkpoint, CheckpointError, Learner, Metrics, Trainer, TrainingError, learning_rate_at,
+    metrics,
+};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::demonstrator::{DemonstrationEpisode, Demonstrator, PartnerDecision};
+use super::features::{N_PARTNER_PLAN, N_PARTNER_STATE, nearest_wanted};
+use super::policy::{PARTNER_KIND, partner_network};
+use super::recordings::read_recordings;
+use crate::actor_critic::{ActorCritic as _, Optimizer};
+use crate::candidate_scorer::CandidateScorer;
+use crate::cloning::{CloningMetrics, Demonstration, FitConfig, fit};
+use crate::demonstrations::Demonstrations;
+use crate::ppo::MAX_BATCH;
+use crate::rollout::RolloutError;
+use crate::rollout_config::{GENERATORS, MAX_VALIDATION_EPISODES, check_splits};
+
+/// Section of a checkpoint.
+const ITERATIONS: &str = "partner.iterations";
+/// Validation metric by which weights are selected: mean log-likelihood of the demonstrated choices, nats.
+const LOG_LIKELIHOOD: &str = "log_likelihood";
+/// One of this many recordings validates.
+const VALIDATION_INTERVAL: usize = 5;
+
+/// Configuration of `chaic train partner`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PartnerCloningConfig {
+    /// Seed of weights, episodes, habits and batches.
+    pub seed: u64,
+    /// Total number of iterations.
+    pub iterations: u64,
+    /// Episodes that each iteration plays.
+    pub episodes: usize,
+    /// Tasks, whose episodes take turns.
+    pub tasks: Vec<TaskId>,
+    /// Generators whose episodes take turns: `gen` and `gen-standard`.
+    pub splits: Vec<String>,
+    /// Helpers, which take turns: `none` or the name of a built-in one.
+    pub helpers: Vec<String>,
+    /// Trace or folder of traces whose partners are imitated, each in its episode. Without it, partners
+    /// with drawn habits are imitated in generated episodes.
+    pub recordings: Option<PathBuf>,
+    /// Width and height of all agents' images, pixels.
+    pub image_size: u32,
+    /// Validation episodes per task. With recordings, every fifth recording validates instead.
+    pub validation_episodes: usize,
+    /// Maximum number of episodes whose demonstrations are kept, the latest ones.
+    pub max_episodes: usize,
+    /// Probability that the labels spread evenly over all candidates.
+    pub label_smoothing: f32,
+    /// Optimizer steps per iteration.
+    pub n_steps: usize,
+    /// Demonstrations per optimizer step.
+    pub batch_size: usize,
+    /// Maximum learning rate.
+    pub learning_rate: f32,
+    /// Shards of a batch, which run in parallel.
+    pub shards: usize,
+    /// Optimizer.
+    pub adam: AdamWConfig,
+}
+
+impl Default for PartnerCloningConfig {
+    fn default() -> PartnerCloningConfig {
+        PartnerCloningConfig {
+            seed: 1,
+            iterations: 20,
+            episodes: 64,
+            tasks: TaskId::paper().collect(),
+            splits: GENERATORS.map(str::to_owned).to_vec(),
+            helpers: vec![NONE.to_owned(), "rhp".to_owned()],
+            recordings: None,
+            image_size: 256,
+            validation_episodes: 5,
+            max_episodes: 8192,
+            label_smoothing: 0.0,
+            n_steps: 200,
+            batch_size: 128,
+            learning_rate: 2e-3,
+            shards: 2,
+            adam: AdamWConfig {
+                beta2: 0.999,
+                weight_decay: 0.01,
+                max_grad_norm: 1.0,
+                ..AdamWConfig::default()
+            },
+        }
+    }
+}
+
+/// Part of the recordings or of the generated episodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Part {
+    Training,
+    Validation,
+}
+
+impl PartnerCloningConfig {
+    /// Reads the recordings of one part; `None` if drawn partners are imitated.
+    fn read_recordings(&self, part: Part) -> Result<Option<Vec<Recording>>, TrainingError> {
+        let Some(path) = &self.recordings else { return Ok(None) };
+        let all = read_recordings(path).map_err(TrainingError::from_data)?;
+        let is_held_out = |k: usize| k % VALIDATION_INTERVAL == 0;
+        let all = all.iter().enumerate();
+        let chosen = all.filter(|(k, _)| is_held_out(*k) == (part == Part::Validation));
+        Ok(Some(chosen.map(|(_, recording)| recording.clone()).collect()))
+    }
+
+    /// Returns an episode with a drawn partner.
+    fn drawn(&self, id: String, stream: &str, index: u64) -> DemonstrationEpisode {
+        let mut rng = RngStream::new(self.seed, stream, index);
+        let seed = (0..4).fold(0, |s, _| s << 16 | rng.below(1 << 16) as u64);
+        let partner = Demonstrator::Habits(PartnerHabits::draw(seed));
+        DemonstrationEpisode { id, partner, helper: self.helper(index as usize) }
+    }
+
+    fn helper(&self, index: usize) -> String {
+        self.helpers[index / self.tasks.len() % self.helpers.len()].clone()
+    }
+
+    /// Returns the episodes of an iteration. Recordings are played once.
+    fn training_episodes(
+        &self,
+        recordings: Option<&[Recording]>,
+        iteration: u64,
+    ) -> Vec<DemonstrationEpisode> {
+        let indices = (0..self.episodes as u64).map(|k| iteration * self.episodes as u64 + k);
+        let Some(recordings) = recordings else {
+            return indices.map(|index| self.generated(index)).collect();
+        };
+        let recorded = |index: u64| Some(self.recorded(recordings.get(index as usize)?));
+        indices.filter_map(recorded).collect()
+    }
+
+    fn recorded(&self, recording: &Recording) -> DemonstrationEpisode {
+        let partner = Demonstrator::Recorded(recording.clone());
+        DemonstrationEpisode { id: recording.episode.clone(), partner, helper: NONE.to_owned() }
+    }
+
+    fn generated(&self, index: u64) -> DemonstrationEpisode {
+        let task = self.tasks[index as usize % self.tasks.len()];
+        let round = index as usize / self.tasks.len() / self.helpers.len();
+        let split = &self.splits[round % self.splits.len()];
+        let mut rng = RngStream::new(self.seed, "demonstration episodes", index);
+        let id = format!("{task}/{split}/{}", SeedRange::POLICY_TRAIN.draw(&mut rng));
+        self.drawn(id, "demonstrated habits", index)
+    }
+
+    /// Returns the validation episodes: those of each task, from the last generator.
+    fn validation_episodes(&self) -> Result<Vec<DemonstrationEpisode>, TrainingError> {
+        if let Some(recordings) = self.read_recordings(Part::Validation)? {
+            return Ok(recordings.iter().map(|recording| self.recorded(recording)).collect());
+        }
+        let first = SeedRange::POLICY_VALIDATION.first;
+        let split = self.splits.last().map_or(GENERATORS[0], String::as_str);
+        let n_tasks = self.tasks.len() as u64;
+        let episode = |index: u64| {
+            let task = self.tasks[(index % n_tasks) as usize];
+            let id = format!("{task}/{split}/{}", first + index / n_tasks);
+            self.drawn(id, "validation habits", index)
+        };
+        Ok((0..n_tasks * self.validation_episodes as u64).map(episode).collect())
+    }
+}
+
+/// Checks that the episode of a recording can be played.
+///
+/// # Errors
+/// One line that names the episode.
+fn check_episode(recording: &Recording) -> Result<(), String> {
+    let episode = find_episode(&recording.episode).map_err(|e| format!("`recordings`: {e}"))?;
+    if Digest::of_setup(episode.setup()) == recording.setup {
+        return Ok(());
+    }
+    let id = &recording.episode;
+    Err(format!("`recordings` has {id} of another version; use the chaic that wrote it"))
+}
+
+/// Trainer of a partner's policy.
+pub struct PartnerCloningTrainer {
+    config: PartnerCloningConfig,
+    folder: PathBuf,
+    recordings: Option<Vec<Recording>>,
+    model: CandidateScorer,
+    learner: Learner,
+    iterations: u64,
+    data: Demonstrations,
+    validation: Vec<DemonstrationEpisode>,
+    /// Choices of the validation episodes, once they were played.
+    validation_decisions: OnceLock<Vec<PartnerDecision>>,
+}
+
+impl PartnerCloningTrainer {
+    fn identity(&self) -> Identity {
+        Identity::new(Self::KIND, &self.model.network)
+    }
+
+    fn read_data(&self) -> Result<Demonstrations, String> {
+        let n_features = (N_PARTNER_STATE, N_PARTNER_PLAN);
+        let max_episodes = self.config.max_episodes;
+        let identity = self.identity();
+        Demonstrations::read(&self.folder, self.iterations, max_episodes, &identity, n_features)
+    }
+
+    fn play(
+        &self,
+        episodes: &[DemonstrationEpisode],
+        stop: &AtomicBool,
+    ) -> Result<Option<Vec<Vec<PartnerDecision>>>, RolloutError> {
+        let size = self.config.image_size;
+        let played: Result<Vec<_>, _> =
+            episodes.par_iter().map(|episode| episode.play(size, stop)).collect();
+        Ok(played?.into_iter().collect())
+    }
+}
+
+impl Trainer for PartnerCloningTrainer {
+    type Config = PartnerCloningConfig;
+    const KIND: &'static str = "partner";
+    const WEIGHTS: &'static str = "partner.safetensors";
+    const RECORD_STEPS: u64 = 1;
+    const CHECKPOINT_STEPS: u64 = 1;
+    const VALIDATION_STEPS: u64 = 5;
+    const SCORE: Option<&'static str> = Some(LOG_LIKELIHOOD);
+    const BOUNDS: BoundTable = &[
+        ("seed", SEED),
+        ("iterations", STEPS),
+        ("episodes", integer(1, 4096)),
+        ("image_size", integer(16, 1024)),
+        ("validation_episodes", integer(1, MAX_VALIDATION_EPISODES)),
+        ("max_episodes", integer(1, 100_000)),
+        ("label_smoothing", FRACTION),
+        ("n_steps", integer(1, 100_000)),
+        ("batch_size", integer(1, MAX_BATCH)),
+        ("learning_rate", LEARNING_RATE),
+        ("shards", SHARDS),
+        ("adam", ADAM),
+    ];
+
+    fn new(
+        config: &PartnerCloningConfig,
+        folder: &Path,
+        _: &mut dyn FnMut(&str),
+        _: &AtomicBool,
+    ) -> Result<Option<PartnerCloningTrainer>, TrainingError> {
+        let model = partner_network();
+        let learner = Learner::new(&model.network, config.seed, config.shards);
+        Ok(Some(PartnerCloningTrainer {
+            recordings: config.read_recordings(Part::Training)?,
+            validation: config.validation_episodes()?,
+            config: config.clone(),
+            folder: folder.to_owned(),
+            model,
+            learner,
+            iterations: 0,
+            data: Demonstrations::default(),
+            validation_decisions: OnceLock::new(),
+        }))
+    }
+
+    fn check(config: &PartnerCloningConfig) -> Result<(), String> {
+        check_splits("splits", &config.splits)?;
+        if config.tasks.is_empty() || config.helpers.is_empty() {
+            let key = if config.tasks.is_empty() { "tasks" } else { "helpers" };
+            return Err(format!("`{key}` is empty"));
+        }
+        let known = [vec![NONE.to_owned()], BuiltInHelpers.names()].concat();
+        if let Some(name) = config.helpers.iter().find(|name| !known.contains(name)) {
+            return Err(format!("`helpers` has `{name}`, expected {}", known.join(", ")));
+        }
+        for part in [Part::Training, Part::Validation] {
+            let recordings = config.read_recordings(part).map_err(|e| e.to_string())?;
+            let Some(recordings) = recordings else { break };
+            if recordings.is_empty() {
+                return Err("`recordings` has a single recording, expected two or more".to_owned());
+            }
+            recordings.iter().try_for_each(check_episode)?;
+        }
+        Ok(())
+    }
+
+    fn read_weights(_: &PartnerCloningConfig, bytes: &[u8]) -> Result<Vec<f32>, WeightsError> {
+        weights::from_bytes(&partner_network().network, bytes, PARTNER_KIND)
+    }
+
+    fn network(&self) -> &Network {
+        &self.model.network
+    }
+
+    fn total_steps(&self) -> u64 {
+        self.config.iterations
+    }
+
+    fn steps_done(&self) -> u64 {
+        self.iterations
+    }
+
+    fn checkpoint(&self) -> Checkpoint {
+        self.learner.checkpoint(ITERATIONS, self.iterations)
+    }
+
+    fn load_parameters(&mut self, parameters: Vec<f32>) {
+        self.learner.load_parameters(parameters);
+    }
+
+    fn resume(
+        &mut self,
+        checkpoint: &Checkpoint,
+        _: &AtomicBool,
+    ) -> Result<Option<()>, CheckpointError> {
+        self.iterations = self.learner.restore(checkpoint, ITERATIONS)?;
+        self.data = self.read_data().map_err(CheckpointError::Data)?;
+        Ok(Some(()))
+    }
+
+    fn step(&mut self, stop: &AtomicBool) -> Result<Option<Metrics>, TrainingError> {
+        let played = self.config.training_episodes(self.recordings.as_deref(), self.iterations);
+        let played = self.play(&played, stop).map_err(TrainingError::from_data)?;
+        let Some(played) = played else { return Ok(None) };
+        let demonstration = |decision: PartnerDecision| Demonstration {
+            observation: decision.observation,
+            action: decision.action,
+            value_target: 0.0,
+        };
+        let episodes: Vec<Vec<Demonstration>> = played
+            .into_iter()
+            .map(|decisions| decisions.into_iter().map(demonstration).collect())
+            .collect();
+        let mut data = self.data.clone();
+        data.add(episodes.clone(), self.config.max_episodes);
+        let all: Vec<&[Demonstration]> = data.episodes.iter().map(Vec::as_slice).collect();
+        let config = &self.config;
+        let learning_rate =
+            learning_rate_at(self.iterations, config.learning_rate, 1, config.iterations);
+        let fit_config = FitConfig {
+            optimizer: Optimizer { adam: &config.adam, learning_rate },
+            label_smoothing: config.label_smoothing,
+            n_steps: config.n_steps,
+            batch_size: config.batch_size,
+            seed: config.seed,
+            iteration: self.iterations,
+        };
+        let before = self.learner.state();
+        let stats = fit(&fit_config, &self.model, &mut self.learner, &all, stop);
+        let Some(CloningMetrics { loss, agreement, .. }) = stats else {
+            self.learner.set_state(before);
+            return Ok(None);
+        };
+        Demonstrations::write(&self.folder, self.iterations, &episodes, &self.identity())?;
+        self.data = data;
+        self.iterations += 1;
+        let n = self.data.episodes.iter().map(Vec::len).sum::<usize>() as f64;
+        Ok(Some(metrics([("demonstrations", n), ("loss", loss), ("agreement", agreement)])))
+    }
+
+    fn validate(&self, stop: &AtomicBool) -> Result<Option<(Metrics, Vec<u8>)>, WeightsError> {
+        let parameters = &self.learner.parameters;
+        let bytes = weights::to_bytes(&self.model.network, parameters, PARTNER_KIND)?;
+        if self.validation_decisions.get().is_none() {
+            let played = self.play(&self.validation, stop);
+            let Some(played) = played.expect("validation episodes can be played") else {
+                return Ok(None);
+            };
+            // Another value would be the same.
+            let _ = self.validation_decisions.set(played.into_iter().flatten().collect());
+        }
+        let decisions = self.validation_decisions.get().expect("it was set above");
+        Ok(Some((imitation_metrics(&self.model, parameters, decisions), bytes)))
+    }
+}
+
+/// Returns the mean log-likelihood of choices, nats, and how often network, rules and the nearest wanted
+/// target agree with them: among all choices, and among choices of a target.
+fn imitation_metrics(
+    model: &CandidateScorer,
+    parameters: &[f32],
+    decisions: &[PartnerDecision],
+) -> Metrics {
+    let mut pass = model.pass();
+    let (mut log_likelihood, mut n_picks) = (0.0, 0.0);
+    let [mut network, mut rules, mut pick_network, mut pick_rules, mut pick_nearest] = [0.0; 5];
+    for decision in decisions {
+        let observations = std::iter::once(&decision.observation);
+        let output = model.forward(parameters, observations, &mut pass).remove(0);
+        let agrees = |action: Option<usize>| f64::from(u8::from(action == Some(decision.action)));
+        let (by_network, by_rules) = (agrees(Some(output.argmax())), agrees(decision.rules_action));
+        log_likelihood += f64::from(output.log_probs[decision.action]);
+        network += by_network;
+        rules += by_rules;
+        if decision.is_pick {
+            n_picks += 1.0;
+            pick_network += by_network;
+            pick_rules += by_rules;
+            pick_nearest += agrees(nearest_wanted(&decision.observation));
+        }
+    }
+    let n = decisions.len().max(1) as f64;
+    let n_targets = f64::max(n_picks, 1.0);
+    metrics([
+        (LOG_LIKELIHOOD, log_likelihood / n),
+        ("accuracy", network / n),
+        ("accuracy_of_rules", rules / n),
+        ("target_accuracy", pick_network / n_targets),
+        ("target_accuracy_of_rules", pick_rules / n_targets),
+        ("target_accuracy_of_nearest", pick_nearest / n_targets),
+        ("choices", decisions.len() as f64),
+        ("target_choices", n_picks),
+    ])
+}

@@ -97,6 +97,7 @@ impl<'a> EpisodeConfig<'a> {
                     isolation: slot.agent().and_then(|agent| agent.isolation()),
                     weights: slot.agent().and_then(|agent| agent.weights()),
                     input: None,
+                    is_live: false,
                 })
                 .collect(),
             renderer: "cpu".to_owned(),

@@ -29,6 +29,7 @@ fn header() -> Header {
             isolation: None,
             weights: None,
             input: None,
+            is_live: false,
             agent: AgentId::PARTNER,
             persona: Persona::Wheelchair,
             impairments: Impairments::new(Impairment::Tremor),

@@ -135,7 +135,7 @@ fn seat(
     world: &World,
     helpers: &dyn HelperRegistry,
 ) -> Seat {
-    let created = agent(header, person, world, helpers);
+    let created = agent(header, person, helpers);
     let mut slot = match created {
         Some(agent) => AgentSlot::with_agent(agent, person.grants),
         None => AgentSlot::external(person.grants, person.sensors),
@@ -152,7 +152,6 @@ fn seat(
 fn agent(
     header: &Header,
     person: &Participant,
-    world: &World,
     helpers: &dyn HelperRegistry,
 ) -> Option<Box<dyn Agent>> {
     let needs_more = person.input.is_some()

@@ -25,10 +25,10 @@ bless:
     CHAIC_BLESS=1 cargo test --locked -p chaic-render --test it golden
     git diff --stat -- crates/dev/chaic-goldens/goldens.txt crates/render/chaic-render/tests/it/golden.txt
 
-# Builds the reference of all crates into target/doc, and the book into book/ if mdbook is installed
+# Builds the reference of all crates into target/doc, and the book with replays into book/ if mdbook is installed
 docs:
     RUSTDOCFLAGS='-D warnings' cargo doc --workspace --no-deps --locked
-    if command -v mdbook >/dev/null; then mdbook build; else echo "mdbook is not installed: skipped the book"; fi
+    if command -v mdbook >/dev/null; then cargo build --locked -p chaic; docs/book.sh target/debug/chaic; else echo "mdbook is not installed: skipped the book"; fi
 
 # Builds the Python wheel into dist/
 wheel:

@@ -1,8 +1,8 @@
-// Shared by the tests and measurements of the pages: CHAIC names the command, CHROMIUM the browser.
+// Shared by the tests and measurements of the pages: CHAIC names the command, CHROMIUM the browser, or FIREFOX another one.
 
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
-import { chromium } from "playwright-core";
+import playwright from "playwright-core";
 
 /** The command line program. */
 export const chaic = process.env.CHAIC ?? "chaic";
@@ -10,9 +10,14 @@ export const chaic = process.env.CHAIC ?? "chaic";
 /** Source of the accessibility checker, to be evaluated in a page. */
 const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 
-/** Starts the browser. */
+/** Path of Firefox, if the tests run there. */
+export const firefox = process.env.FIREFOX;
+
+/** Starts the browser. Firefox as distributed speaks WebDriver BiDi, which this release supports without documentation. */
 export const launch = () =>
-  chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: ["--no-sandbox"] });
+  firefox
+    ? playwright._bidiFirefox.launch({ executablePath: firefox })
+    : playwright.chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: ["--no-sandbox"] });
 
 /** Chooses the first plan of a game by its key until a frame. */
 export async function playTo(page, frame) {

@@ -1,9 +1,9 @@
-// Tests of the pages in Chromium: CHAIC names the command, CHROMIUM the browser.
+// Tests of the pages in Chromium or Firefox: CHAIC names the command, CHROMIUM or FIREFOX the browser.
 //
 // Promises: a page verifies its traces and uses no network; a frame looks the same however it is
 // reached; an altered trace is shown up to the frame that differs; everything works by keyboard; a report
-// has the scores of its run and opens its examples; a comparison shows where two runs diverge; there are
-// no findings of axe at any width or color scheme.
+// has the scores of its run and opens its examples; layers of the map show what both agents know; a
+// comparison shows where two runs diverge; there are no findings of axe at any width or color scheme.
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
@@ -13,7 +13,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { deflateRawSync, inflateRawSync } from "node:zlib";
-import { chaic, findings, launch, playTo, scrollWidth } from "./test-kit.mjs";
+import { chaic, findings, firefox, launch, playTo, scrollWidth } from "./test-kit.mjs";
 
 const folder = mkdtempSync(join(tmpdir(), "chaic-web-"));
 const run = join(folder, "run");
@@ -128,6 +128,61 @@ test("a replay plays, pauses and moves to events by keyboard", async () => {
   await page.close();
 });
 
+/** Waits until both agents have run again and the layers of the shown frame are drawn. */
+const layersDrawn = (page) =>
+  page.waitForFunction(
+    () => {
+      const { layers, player } = document.querySelector("chaic-replay");
+      return layers.rerun?.is_complete && layers.data.memories.length === layers.memories.length && !player.isDrawing;
+    },
+    undefined,
+    { timeout: 60_000 },
+  );
+
+/** Returns the color at a point of the canvas with the layers, given in parts of its size. */
+const layerColor = (page, x, y) =>
+  page.evaluate(
+    ([x, y]) => {
+      const canvas = document.querySelector("chaic-replay").shadowRoot.querySelector("canvas.layers");
+      const [column, row] = [Math.floor(x * canvas.width), Math.floor(y * canvas.height)];
+      return [...canvas.getContext("2d").getImageData(column, row, 1, 1).data];
+    },
+    [x, y],
+  );
+
+test("layers of the map show what both agents know, by keyboard and in words", async () => {
+  const { page } = await open(view, "#0@900", { viewport: { width: 320, height: 740 } });
+  await shown(page);
+  const toggle = async (name) => {
+    await page.getByLabel(name).focus();
+    await page.keyboard.press("Space");
+  };
+  const words = () => page.locator("chaic-replay .words").innerText();
+  await toggle("What the partner knows");
+  await toggle("What the helper believes");
+  await toggle("Limits of the partner");
+  await layersDrawn(page);
+  const text = await words();
+  for (const name of ["partner", "helper"]) {
+    assert.match(text, new RegExp(`The ${name} runs again, and \\d+ of its actions equal the recorded ones\\.`));
+    assert.match(text, new RegExp(`The ${name}, at its decision in frame \\d+: has seen [1-9]\\d* m²`));
+  }
+  assert.match(text, /Its belief equals the recorded one/);
+  assert.match(text, /the partner \(.+\) reaches tops from 0\.25 to 1\.50 m/);
+  assert.deepEqual(await findings(page), []);
+  assert.ok((await scrollWidth(page)) <= 320);
+  assert.equal((await layerColor(page, 0.5, 0.99))[3], 0, "the legend is free");
+  await toggle("Truth");
+  await layersDrawn(page);
+  await page.waitForTimeout(200);
+  assert.equal((await layerColor(page, 0.5, 0.99))[3], 255, "the truth is hidden");
+  await page.evaluate(() => document.querySelector("chaic-replay").seek(30));
+  await page.waitForFunction(() => document.querySelector("chaic-replay").shown.frame === 30);
+  const area = (text) => Number(/has seen (\d+) m²/.exec(text)[1]);
+  assert.ok(area(await words()) < area(text), "less is known at an earlier frame");
+  await page.close();
+});
+
 test("an altered trace is shown up to the frame that differs", async () => {
   const trace = join(run, "traces/low_target/none/test-00-s0.jsonl");
   const original = readFileSync(trace, "utf8");
@@ -222,12 +277,16 @@ test("a comparison shows both runs, and where they diverge", async () => {
 /** Stops the game, downloads its trace and verifies it on the command line. */
 async function verified(page, name) {
   await page.getByRole("button", { name: "Stop here" }).click();
-  const [download] = await Promise.all([
-    page.waitForEvent("download"),
-    page.getByRole("link", { name: "Download the trace" }).click(),
-  ]);
+  const link = page.getByRole("link", { name: "Download the trace" });
   const file = join(folder, name);
-  await download.saveAs(file);
+  if (firefox) {
+    // This protocol has no event for downloads.
+    const url = await link.evaluate((element) => element.href);
+    writeFileSync(file, await page.evaluate((from) => fetch(from).then((response) => response.text()), url));
+  } else {
+    const [download] = await Promise.all([page.waitForEvent("download"), link.click()]);
+    await download.saveAs(file);
+  }
   const text = execFileSync(chaic, ["verify", file, "--format", "json"], { encoding: "utf8" });
   assert.equal(JSON.parse(text).passed, true);
   return readFileSync(file, "utf8");

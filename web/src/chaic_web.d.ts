@@ -16,7 +16,7 @@ declare module "*/chaic_web.js" {
     info(): string;
     advance(frames: number): void;
     state(): string;
-    choose_plan(index: number): boolean;
+    choose_plan(plan: string): boolean;
     act(action: string): boolean;
     trace(): string;
     view(side: number): Picture;
@@ -30,7 +30,11 @@ declare module "*/chaic_web.js" {
     info(): string;
     seek(frame: number): string;
     view(agent: number, side: number): Picture;
-    map(width: number): Picture;
+    rerun_agents(): string;
+  memory(agent: number): string;
+  explored(agent: number): Uint8Array;
+  beyond_limits(): string;
+  map(width: number): Picture;
     free(): void;
   }
 }

@@ -79,8 +79,8 @@ export class PlaybackClock implements ReactiveController {
       End: () => this.seek(this.frames?.last ?? 0),
     };
     const action = actions[event.key];
-    // A focused button handles the space bar itself.
-    if (!action || (event.key === " " && target.matches("button"))) return;
+    // Buttons and summaries handle the space bar themselves.
+    if (!action || (event.key === " " && target.matches("button, summary"))) return;
     event.preventDefault();
     action();
   }

@@ -90,6 +90,8 @@ export class ChaicCompare extends LitElement {
       agents: [this.viewer],
       viewPx: drawnSize(this.viewCanvases[0], MAX_PX.view),
       mapPx: run === 0 ? drawnSize(this.mapCanvas, MAX_PX.map) : 0,
+      memories: [],
+      withLimits: false,
     });
     const drawn = ({ state: shown, views, map }: { state: FrameState; views: Picture[]; map: Picture | null }) => {
       this.shown = replaced(this.shown, run, shown);

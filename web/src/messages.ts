@@ -59,6 +59,8 @@ export interface ReplayInfo {
   problem: string | null;
   timeline: { activities: Activity[]; story: StoryLine[]; deliveries: Delivery[] };
   decisions: DecisionLine[];
+  /** Height of the map without its legend, in widths of the map. */
+  map_height: number;
   trail_interval: number;
   /** Positions of each agent, in widths of the map from its left and upper edge. */
   trails: [number, number][][];
@@ -80,6 +82,65 @@ export interface FrameState {
   belief: Belief | null;
 }
 
+/** Agreement of an agent that runs again with the replay. */
+export interface RerunInfo {
+  agent: number;
+  /** False if the agent cannot run in a page. */
+  is_available: boolean;
+  n_equal: number;
+  /** Frame of the first decision that differs. */
+  differs_at: number | null;
+}
+
+/** State of the agents that run again beside a replay. */
+export interface RerunState {
+  /** Frame that they have reached. */
+  frame: number;
+  is_complete: boolean;
+  agents: RerunInfo[];
+}
+
+/** Position on the map, in widths of the map from its left and upper edge. */
+export type Place = [number, number];
+
+/** Memory of an agent at a frame. */
+export interface Memory {
+  agent: number;
+  /** Frame of the decision from which the memory is. */
+  frame: number;
+  seen_m2: number;
+  /** Position of the first cell. */
+  map_at: Place;
+  /** Side of a cell. */
+  cell: number;
+  n_columns: number;
+  /** Probability that the goal wants an object in per mille, for agents that infer the goal. */
+  objects: { name: string; at: Place; last_seen: number; wanted: number | null }[];
+  /** Name, last known position and frame of other people. */
+  people: [string, Place, number][];
+  path: Place[];
+  path_m: number;
+  plan: string;
+  is_belief_equal: boolean | null;
+  /** Cells row by row: 0 is unknown, 1 free, 2 occupied. */
+  cells: Uint8Array;
+}
+
+/** Object that the partner cannot pick up without a chance of failure. */
+export interface BeyondLimit {
+  name: string;
+  at: Place;
+  limits: ("too_high" | "too_low" | "too_heavy")[];
+  top_m: number;
+  mass_kg: number;
+}
+
+/** Layers of the map that need data of the worker. */
+export interface LayerData {
+  memories: Memory[];
+  beyond: BeyondLimit[];
+}
+
 /** Image for a canvas. */
 export interface Picture {
   width: number;
@@ -98,6 +159,8 @@ export interface LiveConfig {
   level: InputLevel;
   /** Helper if the person is the partner. */
   helper: string;
+  /** True if the world goes on while the person thinks. */
+  is_live?: boolean;
 }
 
 /** Facts about a played episode that do not change. */
@@ -130,12 +193,27 @@ export interface LiveState {
 /** Action of a person, as in a trace. */
 export type Action = string | Record<string, unknown>;
 
+/** Pictures and layers of a frame. */
+export interface Wanted {
+  /** Agents whose views are drawn. */
+  agents: number[];
+  /** Side of a view, pixels. */
+  viewPx: number;
+  /** Width of the map, pixels; 0 for none. */
+  mapPx: number;
+  /** Agents whose memories are shown. */
+  memories: number[];
+  /** True if the objects beyond the limits of the partner are shown. */
+  withLimits: boolean;
+}
+
 /** Message to the worker. */
 export type Request =
   | { type: "open"; module: ArrayBuffer; trace: Uint8Array; episode: Uint8Array }
-  | { type: "frame"; frame: number; agents: number[]; viewPx: number; mapPx: number }
+  | ({ type: "frame"; frame: number } & Wanted)
+  | { type: "rerun" }
   | { type: "play"; module: ArrayBuffer; episode: Uint8Array; config: LiveConfig; branch?: Branch }
-  | { type: "advance"; frames: number; viewPx: number; input?: { plan: number } | { action: Action } }
+  | { type: "advance"; frames: number; viewPx: number; input?: { plan: string } | { action: Action } }
   | { type: "trace" }
   | { type: "reference"; helper: string };
 
@@ -148,7 +226,8 @@ export interface Branch {
 /** Message of the worker. */
 export type Response =
   | { type: "opened"; info: ReplayInfo }
-  | { type: "frame"; state: FrameState; views: Picture[]; map: Picture | null }
+  | { type: "frame"; state: FrameState; views: Picture[]; map: Picture | null; layers: LayerData }
+  | { type: "rerun"; state: RerunState }
   | { type: "playing"; info: LiveInfo }
   | { type: "live"; state: LiveState; view: Picture }
   | { type: "trace"; trace: string }

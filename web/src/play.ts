@@ -12,8 +12,6 @@ import { styles } from "./styles.js";
 const POINTING_PX = 512;
 /** Helpers whose results are laid beside the person's. */
 const REFERENCES = ["none", "rhp", "oracle"];
-/** Duration of a pause in live play, frames. */
-const PAUSE_FRAMES = 3;
 /** Simulated time after which a study gets the next lines of the trace, frames. */
 const RECORD_FRAMES = 15;
 
@@ -67,7 +65,7 @@ export class ChaicPlay extends LitElement {
   private isBusy = false;
   /** True after the end of the episode, or after the person has stopped. */
   @state() private isOver = false;
-  private input?: { plan: number } | { action: Action };
+  private input?: { plan: string } | { action: Action };
   private lastTime = 0;
   private elapsedFrames = 0;
   private scanTimer = 0;
@@ -106,7 +104,7 @@ export class ChaicPlay extends LitElement {
     this.worker.onmessage = (event: MessageEvent<Response>) => this.receive(event.data);
     this.worker.onerror = (event) => this.fail(event.message || "the worker has stopped");
     const { module, episode, config, branch } = game;
-    this.post({ type: "play", module, episode, config, branch });
+    this.post({ type: "play", module, episode, config: { ...config, is_live: game.isLive }, branch });
   }
 
   private post(request: Request): void {
@@ -158,8 +156,7 @@ export class ChaicPlay extends LitElement {
     const framesPerSecond = (this.game?.speed ?? 1) * (this.info?.frames_per_second ?? 0);
     this.elapsedFrames += (Math.min(time - this.lastTime, 250) / 1000) * framesPerSecond;
     this.lastTime = time;
-    const isWaiting = this.shown?.status === "waiting" && !this.input;
-    if (isWaiting && this.game?.isLive && this.elapsedFrames >= 1) this.pause();
+    const isWaiting = this.shown?.status === "waiting" && !this.input && !this.game?.isLive;
     const frames = Math.floor(this.elapsedFrames);
     if (!this.isBusy && frames > 0 && (!isWaiting || this.input)) {
       this.elapsedFrames -= frames;
@@ -174,14 +171,12 @@ export class ChaicPlay extends LitElement {
     requestAnimationFrame((next) => this.advance(next));
   }
 
-  /** Waits for a moment in live play. */
-  private pause(): void {
-    if (this.game?.config.level === "steps") this.input = { action: { wait: { frames: PAUSE_FRAMES } } };
-  }
-
   private show(shown: LiveState): void {
     const isNewTurn = shown.status === "waiting" && this.shown?.status !== "waiting";
-    this.shown = shown;
+    // A plan stays where it is while the list changes in a live game.
+    const kept = isNewTurn ? [] : (this.shown?.plans ?? []).filter((plan) => shown.plans.includes(plan));
+    const added = shown.plans.filter((plan) => !kept.includes(plan));
+    this.shown = { ...shown, plans: [...kept, ...added] };
     if (shown.events.length > 0) this.story = [...this.story, ...shown.events];
     if (shown.status === "ended") this.stop();
     else if (this.game?.isStudy && (isNewTurn || shown.frame - this.recordedFrame >= RECORD_FRAMES)) {
@@ -234,8 +229,9 @@ export class ChaicPlay extends LitElement {
     if (helper) this.post({ type: "reference", helper });
   }
 
-  private choose(plan: number): void {
-    if (this.shown?.status === "waiting" && !this.isOver) this.input = { plan };
+  private choose(index: number): void {
+    const plan = this.shown?.plans[index];
+    if (this.shown?.status === "waiting" && !this.isOver && plan !== undefined) this.input = { plan };
   }
 
   private act(action: Action): void {

@@ -1,12 +1,13 @@
 // Player of one replay in a worker. Of several requests while the worker draws, only the last counts.
 
-import type { FrameState, Picture, ReplayInfo, Request, Response } from "./messages.js";
+import type { FrameState, LayerData, Picture, ReplayInfo, Request, RerunState, Response, Wanted } from "./messages.js";
 
 /** Drawn frame. */
 export interface DrawnFrame {
   state: FrameState;
   views: Picture[];
   map: Picture | null;
+  layers: LayerData;
 }
 
 /** What a player needs. */
@@ -16,22 +17,13 @@ export interface Source {
   episode: Uint8Array;
 }
 
-/** Pictures of a frame. */
-export interface Wanted {
-  /** Agents whose views are drawn. */
-  agents: number[];
-  /** Side of a view, pixels. */
-  viewPx: number;
-  /** Width of the map, pixels; 0 for none. */
-  mapPx: number;
-}
-
 /** Player in a worker. */
 export class ReplayPlayer {
   private readonly worker: Worker;
   private isBusy = false;
   private next: number | undefined;
   private isOpen = false;
+  private onRerun?: (state: RerunState) => void;
 
   /**
    * Opens a replay. `wanted` returns what is drawn next. `onOpened` and `onFrame` receive the results, `onError` the reason if the replay cannot
@@ -60,6 +52,13 @@ export class ReplayPlayer {
     this.drawNext();
   }
 
+  /** Runs partner and helper again beside the replay; `onProgress` receives how far they are. */
+  rerun(onProgress: (state: RerunState) => void): void {
+    this.onRerun = onProgress;
+    const request: Request = { type: "rerun" };
+    this.worker.postMessage(request);
+  }
+
   /** True while a frame is drawn. */
   get isDrawing(): boolean {
     return this.isBusy;
@@ -83,6 +82,10 @@ export class ReplayPlayer {
   }
 
   private receive(response: Response): void {
+    if (response.type === "rerun") {
+      this.onRerun?.(response.state);
+      return;
+    }
     this.isBusy = false;
     if (response.type === "opened") {
       this.isOpen = true;

@@ -6,9 +6,10 @@ import { PlaybackClock } from "./clock.js";
 import { controls } from "./controls.js";
 import { clock, lastBefore } from "./frames.js";
 import { badge } from "./badge.js";
-import type { AgentInfo, Belief, FrameState, ReplayInfo } from "./messages.js";
+import { MapLayers } from "./layers.js";
+import type { AgentInfo, Belief, FrameState, ReplayInfo, Wanted } from "./messages.js";
 import { drawnSize, MAX_PX, paint } from "./pictures.js";
-import { ReplayPlayer, type DrawnFrame, type Source, type Wanted } from "./player.js";
+import { ReplayPlayer, type DrawnFrame, type Source } from "./player.js";
 import { styles } from "./styles.js";
 import { timeline } from "./timeline.js";
 import { WidthObserver } from "./width.js";
@@ -33,7 +34,10 @@ export class ChaicReplay extends LitElement {
 
   @queryAll("canvas.view") private viewCanvases!: NodeListOf<HTMLCanvasElement>;
   @query("canvas.map") private mapCanvas?: HTMLCanvasElement;
+  @query("canvas.layers") private layerCanvas?: HTMLCanvasElement;
 
+  private readonly layers = new MapLayers(this, () => this.chooseLayers());
+  private isRerunning = false;
   private player?: ReplayPlayer;
   private readonly playback = new PlaybackClock(
     this,
@@ -69,6 +73,8 @@ export class ChaicReplay extends LitElement {
   private open(source: Source): void {
     this.player?.close();
     this.info = this.shown = this.problem = undefined;
+    this.isRerunning = false;
+    this.layers.reset();
     this.playback.reset();
     const opened = (info: ReplayInfo): void => {
       this.info = info;
@@ -76,7 +82,10 @@ export class ChaicReplay extends LitElement {
       const events = info.timeline.story.map((line) => line.frame);
       this.playback.reset({ last: info.last_frame, perSecond: info.frames_per_second, events });
       // The size of the pictures is known after the layout.
-      void this.updateComplete.then(() => this.seek(this.start));
+      void this.updateComplete.then(() => {
+        this.seek(this.start);
+        this.chooseLayers();
+      });
       this.dispatchEvent(new CustomEvent("opened", { detail: info }));
     };
     const failed = (message: string): void => {
@@ -87,6 +96,8 @@ export class ChaicReplay extends LitElement {
       agents: viewers(this.info).map((agent) => agent.id),
       viewPx: drawnSize(this.viewCanvases[0], MAX_PX.view),
       mapPx: drawnSize(this.mapCanvas, MAX_PX.map),
+      memories: this.layers.memories,
+      withLimits: this.layers.withLimits,
     });
     this.player = new ReplayPlayer(this.workerSource, source, wanted, opened, drawn, failed);
   }
@@ -96,10 +107,23 @@ export class ChaicReplay extends LitElement {
     this.dispatchEvent(new CustomEvent("moved", { detail: frame }));
   }
 
-  private draw({ state: shown, views, map }: DrawnFrame): void {
+  private draw({ state: shown, views, map, layers }: DrawnFrame): void {
     this.shown = shown;
     views.forEach((picture, k) => paint(this.viewCanvases[k], picture));
-    if (map) paint(this.mapCanvas, map);
+    if (!map || !this.info) return;
+    paint(this.mapCanvas, map);
+    this.layers.draw(this.layerCanvas, map, this.info.map_height, layers);
+  }
+
+  /** Draws other layers; memories need the agents to run again. */
+  private chooseLayers(): void {
+    const { player, layers } = this;
+    player?.seek(this.frame);
+    if (!player || this.isRerunning || layers.memories.length === 0) return;
+    this.isRerunning = true;
+    player.rerun((state) => {
+      if (layers.advanced(state, this.frame)) player.seek(this.frame);
+    });
   }
 
   override render(): TemplateResult {
@@ -110,6 +134,7 @@ export class ChaicReplay extends LitElement {
     return html`<section aria-label="Replay" @keydown=${(event: KeyboardEvent) => this.playback.press(event)}>
       ${this.heading(info)} ${this.pictures(info)}
       ${controls(this.playback, info.last_frame, info.frames_per_second, this.status(info))}
+      ${this.layers.choice(info)} ${this.layers.words(info)}
       ${timeline(info, this.frame, (frame) => this.seek(frame))} ${legend()} ${this.seats(info)}
       <div class="columns">${this.story(info)} ${this.belief(this.shown?.belief)}</div>
     </section>`;
@@ -149,7 +174,10 @@ export class ChaicReplay extends LitElement {
         </figure>`,
       )}
       <figure>
-        <canvas class="map" width="480" height="480" role="img" aria-label="Map of the place with both agents"></canvas>
+        <div class="overlaid">
+          <canvas class="map" width="480" height="480" role="img" aria-label="Map of the place with both agents"></canvas>
+          <canvas class="layers" aria-hidden="true"></canvas>
+        </div>
         <figcaption>Map${this.shown?.belief ? "; ring: believed position of the partner" : ""}</figcaption>
       </figure>
     </div>`;

@@ -89,12 +89,46 @@ export const styles = css`
     overflow: hidden;
     position: relative;
   }
+  canvas.layers,
   .trails {
     left: 0;
     pointer-events: none;
     position: absolute;
     top: 0;
     width: 100%;
+  }
+  fieldset.layers {
+    border: 1px solid var(--line);
+    border-radius: 0.25rem;
+    display: flex;
+    flex-wrap: wrap;
+    gap: 0 1rem;
+    margin: 0.5rem 0;
+    min-width: 0;
+    padding: 0.25rem 0.75rem;
+  }
+  .layers label {
+    align-items: center;
+    display: inline-flex;
+    gap: 0.375rem;
+    min-height: 2rem;
+  }
+  .layers input {
+    accent-color: var(--accent);
+    height: 1.25rem;
+    margin: 0;
+    width: 1.25rem;
+  }
+  .words {
+    overflow-wrap: anywhere;
+  }
+  .words summary {
+    cursor: pointer;
+    min-height: 1.75rem;
+  }
+  .words ul {
+    margin: 0;
+    padding-left: 1.5rem;
   }
   .trails polyline {
     fill: none;
@@ -364,5 +398,8 @@ export const styles = css`
   }
   meter {
     width: 100%;
+  }
+  .belief td:not(.number) {
+    width: 55%;
   }
 `;

@@ -1,12 +1,18 @@
 // Worker that re-simulates, plays and draws, so that the page stays responsive.
 
 import { initSync, Live, Player, reference_rate } from "../pkg/chaic_web.js";
-import type { Picture, Request, Response } from "./messages.js";
+import type { LayerData, Memory, Picture, Request, RerunState, Response } from "./messages.js";
 
 let player: Player | undefined;
 let live: Live | undefined;
 let episode: Uint8Array | undefined;
 let seed = 0;
+let isRerunning = false;
+
+/** Longest time for which the agents run again before the worker answers requests, milliseconds. */
+const SLICE_MS = 20;
+/** Time between messages about their progress, milliseconds. */
+const PROGRESS_MS = 250;
 
 function send(response: Response, transfer: ArrayBuffer[] = []): void {
   postMessage(response, { transfer });
@@ -28,6 +34,10 @@ function answer(request: Request): void {
       break;
     case "frame":
       drawFrame(request);
+      break;
+    case "rerun":
+      if (!isRerunning) rerun(performance.now());
+      isRerunning = true;
       break;
     case "play":
       play(request);
@@ -51,7 +61,28 @@ function drawFrame(request: Extract<Request, { type: "frame" }>): void {
   const views = request.agents.map((agent) => taken(player!.view(agent, request.viewPx)));
   const map = request.mapPx > 0 ? taken(player.map(request.mapPx)) : null;
   const pictures = map ? [...views, map] : views;
-  send({ type: "frame", state, views, map }, pictures.map((picture) => picture.rgba.buffer));
+  const layers = layerData(player, request.memories, request.withLimits);
+  send({ type: "frame", state, views, map, layers }, pictures.map((picture) => picture.rgba.buffer));
+}
+
+function layerData(from: Player, agents: number[], withLimits: boolean): LayerData {
+  const memories = agents.flatMap((agent) => {
+    const memory: Memory | null = JSON.parse(from.memory(agent));
+    return memory ? [{ ...memory, cells: from.explored(agent) }] : [];
+  });
+  return { memories, beyond: withLimits ? JSON.parse(from.beyond_limits()) : [] };
+}
+
+/** Runs the agents again in slices, so that frames are drawn meanwhile. */
+function rerun(lastMessage: number): void {
+  if (!player) return;
+  const start = performance.now();
+  let state: RerunState;
+  do state = JSON.parse(player.rerun_agents());
+  while (!state.is_complete && performance.now() - start < SLICE_MS);
+  const isDue = performance.now() - lastMessage > PROGRESS_MS || state.is_complete;
+  if (isDue) send({ type: "rerun", state });
+  if (!state.is_complete) setTimeout(() => rerun(isDue ? performance.now() : lastMessage));
 }
 
 function play(request: Extract<Request, { type: "play" }>): void {

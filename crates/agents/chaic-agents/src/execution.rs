@@ -113,6 +113,11 @@ impl Executor {
         self.frontier_explorer.is_exhausted()
     }
 
+    /// Returns the cells of the current path from the agent on; empty without a path.
+    pub fn path(&self) -> &[usize] {
+        self.navigator.path()
+    }
+
     /// Starts a plan.
     pub fn start_plan(&mut self, now: Frame, rules: &PlannerRules) {
         self.navigator.reset();

@@ -24,6 +24,7 @@ use crate::rules::{Exploration, PlannerRules, Walking};
 use crate::track::{Hands, Intent, TrackId};
 
 pub mod egocentric;
+mod view;
 
 /// Tolerance by which the observed top of a place may be too low, meters.
 const TOP_TOLERANCE_M: f32 = 0.1;

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use chaic_core::agent::{BelievedObject, Thought};
+use chaic_core::memory_view::MemoryView;
 use chaic_core::observation::{Grants, SensorConfig};
 use chaic_core::{Action, Agent, AgentError, AgentId, Briefing, Observation, Outcome, Target};
 
@@ -433,6 +434,11 @@ impl<P: Policy> Agent for PlanningAgent<P> {
                 .and_then(|e| self.policy.partner_belief(&e.briefing, &e.memory))
                 .map(Box::new),
         }
+    }
+
+    fn memory_view(&self) -> Option<MemoryView> {
+        let episode = self.episode.as_ref()?;
+        Some(episode.memory.view(episode.executor.path()))
     }
 
     fn counters(&self) -> BTreeMap<String, u64> {

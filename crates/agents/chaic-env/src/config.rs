@@ -98,6 +98,7 @@ impl<'a> EpisodeConfig<'a> {
                     weights: slot.agent().and_then(|agent| agent.weights()),
                     recording: slot.agent().and_then(|agent| agent.recording()),
                     input: None,
+                    is_live: false,
                 })
                 .collect(),
             renderer: "cpu".to_owned(),

@@ -91,6 +91,13 @@ impl<T: Deref<Target = Trace>> Playback<T> {
         &self.thoughts
     }
 
+    /// Returns the decisions that the next [`Playback::step`] submits.
+    pub fn due_decisions(&self) -> impl Iterator<Item = &Decision> {
+        let frame = self.world.state().frame;
+        let next = self.decisions.iter().skip(self.n_submitted);
+        next.map_while(|next| decision(&self.trace, *next)).take_while(move |d| d.frame == frame)
+    }
+
     /// Submits the decisions of the current frame, advances the world by one frame and returns its
     /// events; `None` at the end of the trace.
     ///

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use chaic_core::agent::{ChildState, Thought};
+use chaic_core::memory_view::MemoryView;
 use chaic_core::observation::SensorConfig;
 use chaic_core::{Action, Agent, AgentError, AgentId, Briefing, Observation};
 use chaic_world::episode_stream;
@@ -55,6 +56,10 @@ impl Agent for Reseeded {
 
     fn thought(&self) -> Thought {
         self.agent.thought()
+    }
+
+    fn memory_view(&self) -> Option<MemoryView> {
+        self.agent.memory_view()
     }
 
     fn child_state(&self) -> Option<ChildState> {

@@ -147,6 +147,9 @@ pub struct Participant {
     /// Level of the decisions if a person controls it, `plans` or `steps`; absent for a program.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub input: Option<String>,
+    /// True if the world did not wait for the decisions of the person.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_live: bool,
 }
 
 /// A trace in memory.

@@ -64,8 +64,37 @@ impl Player {
         Ok(Picture { image })
     }
 
+    /// Runs partner and helper again up to their next decision, and returns [`crate::RerunState`].
+    ///
+    /// # Errors
+    /// Never in practice.
+    pub fn rerun_agents(&mut self) -> Result<String, JsError> {
+        json(&self.player.rerun_agents().map_err(error)?)
+    }
+
+    /// Returns [`crate::MemoryState`] of an agent, or `null`.
+    ///
+    /// # Errors
+    /// Never in practice.
+    pub fn memory(&self, agent: u8) -> Result<String, JsError> {
+        json(&self.player.memory(AgentId(agent)))
+    }
+
+    /// Returns the map in the memory of an agent, see [`ReplayPlayer::explored`].
+    pub fn explored(&self, agent: u8) -> Vec<u8> {
+        self.player.explored(AgentId(agent))
+    }
+
+    /// Returns a list of [`crate::BeyondLimit`].
+    ///
+    /// # Errors
+    /// Never in practice.
+    pub fn beyond_limits(&self) -> Result<String, JsError> {
+        json(&self.player.beyond_limits())
+    }
+
     /// Draws the map.
-    pub fn map(&self, width_px: u32) -> Picture {
+    pub fn map(&mut self, width_px: u32) -> Picture {
         Picture { image: self.player.draw_map(width_px) }
     }
 }
@@ -127,9 +156,9 @@ impl Live {
         json(&self.session.state())
     }
 
-    /// Selects a plan of the last state; false if it does not exist.
-    pub fn choose_plan(&mut self, index: usize) -> bool {
-        self.session.choose_plan(index)
+    /// Selects a plan by its text; false if it cannot be started now.
+    pub fn choose_plan(&mut self, plan: &str) -> bool {
+        self.session.choose_plan(plan)
     }
 
     /// Performs an action (JSON); false if the person cannot decide now.

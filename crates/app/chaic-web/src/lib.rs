@@ -2,7 +2,7 @@
 //!
 //! **What it is**: the module that the pages of chaic load. A [`ReplayPlayer`] replays the whole trace
 //! once when it is opened, compares the digest of each decision with the recorded one, and then shows
-//! any frame. A [`LiveSession`] runs an episode in which a person controls an agent, from the start or
+//! any frame. Partner and helper run again beside it, for drawings of what they know. A [`LiveSession`] runs an episode in which a person controls an agent, from the start or
 //! from a frame of a trace. `bindings` exports both to JavaScript.
 //!
 //! **What it is not**: it reads no files, uses no network and no threads, and contains no page; the
@@ -11,14 +11,18 @@
 #[cfg(target_arch = "wasm32")]
 mod bindings;
 mod drawing;
+mod limits;
 mod live;
+mod memory_history;
 mod player;
 mod timeline;
 
 pub use drawing::DrawnImage;
+pub use limits::{BeyondLimit, Limit};
 pub use live::{
     InputLevel, LiveConfig, LiveError, LiveInfo, LiveSession, LiveState, LiveStatus, PERSON,
     reference,
 };
-pub use player::{DecisionLine, FrameState, PlayerError, ReplayInfo, ReplayPlayer};
+pub use memory_history::{MemoryState, PlacedObject, RerunInfo};
+pub use player::{DecisionLine, FrameState, PlayerError, ReplayInfo, ReplayPlayer, RerunState};
 pub use timeline::{Activity, Delivery, StoryLine, Timeline};

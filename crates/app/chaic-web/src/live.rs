@@ -26,6 +26,9 @@ use crate::timeline::StoryLine;
 /// Name in traces of an agent that a person controls.
 pub const PERSON: &str = "human";
 
+/// Duration of a pause of a person who decides nothing while the world goes on, frames.
+const PAUSE_FRAMES: u32 = 3;
+
 /// Reason why an episode cannot be played.
 #[derive(Debug, thiserror::Error)]
 pub enum LiveError {
@@ -70,6 +73,9 @@ pub struct LiveConfig {
     pub level: InputLevel,
     /// Helper if the person is the partner, a built-in one or `none`.
     pub helper: String,
+    /// True if the world goes on while the person thinks; otherwise it waits.
+    #[serde(default)]
+    pub is_live: bool,
 }
 
 /// Progress of the episode.
@@ -78,7 +84,7 @@ pub struct LiveConfig {
 pub enum LiveStatus {
     /// The person acts or waits.
     Running,
-    /// The person must decide; the world waits.
+    /// The person can decide; the world waits, unless the clock is live.
     Waiting,
     /// The episode is over.
     Ended,
@@ -133,6 +139,9 @@ pub struct LiveSession {
     scene: Scene,
     seat: AgentId,
     level: InputLevel,
+    is_live: bool,
+    /// Chosen action that starts after the pause, if the clock is live.
+    next_action: Option<Action>,
     /// Executes the person's plans; `None` if the person chooses actions.
     planner: Option<Planner>,
     status: LiveStatus,
@@ -201,6 +210,8 @@ impl LiveSession {
             env,
             seat: config.seat,
             level: config.level,
+            is_live: config.is_live,
+            next_action: None,
             planner,
             status: LiveStatus::Running,
             events: Vec::new(),
@@ -267,7 +278,8 @@ impl LiveSession {
         }
     }
 
-    /// Advances by at most this many frames, until the person must decide or the episode ends.
+    /// Advances by at most this many frames, until the person must decide or the episode ends. With a
+    /// live clock, the person's agent pauses until a decision.
     ///
     /// # Errors
     /// If an agent cannot decide.
@@ -277,8 +289,12 @@ impl LiveSession {
             if self.run_frame()? != AdvanceOutcome::NeedsAction {
                 continue;
             }
-            match self.planned_action()? {
+            match self.chosen_action()? {
                 Some(action) => self.submit(action),
+                None if self.is_live => {
+                    self.submit(Action::Wait { frames: PAUSE_FRAMES });
+                    self.status = LiveStatus::Waiting;
+                }
                 None => {
                     self.status = LiveStatus::Waiting;
                     break;
@@ -288,10 +304,15 @@ impl LiveSession {
         Ok(self.status)
     }
 
-    /// Selects one of the plans of the last state. Returns false if it does not exist.
-    pub fn choose_plan(&mut self, index: usize) -> bool {
+    /// Selects a plan by its text. Returns false if it cannot be started now: with a live clock, the
+    /// plans may have changed since the last state.
+    pub fn choose_plan(&mut self, plan: &str) -> bool {
         let planner = self.planner.as_mut().filter(|_| self.status == LiveStatus::Waiting);
-        let is_chosen = planner.is_some_and(|planner| planner.agent.policy_mut().set_plan(index));
+        let is_chosen = planner.is_some_and(|planner| {
+            let policy = planner.agent.policy_mut();
+            let index = policy.valid().iter().position(|valid| valid.to_string() == plan);
+            index.is_some_and(|index| policy.set_plan(index))
+        });
         if is_chosen {
             self.status = LiveStatus::Running;
         }
@@ -302,7 +323,10 @@ impl LiveSession {
     /// chooses plans.
     pub fn act(&mut self, action: Action) -> bool {
         let is_due = self.planner.is_none() && self.status == LiveStatus::Waiting;
-        if is_due {
+        if is_due && self.is_live {
+            self.next_action = Some(action);
+            self.status = LiveStatus::Running;
+        } else if is_due {
             self.submit(action);
         }
         is_due
@@ -345,10 +369,10 @@ impl LiveSession {
         }
     }
 
-    /// Returns the next action of the person's plan; `None` if the person must decide.
-    fn planned_action(&mut self) -> Result<Option<Action>, LiveError> {
+    /// Returns the chosen action, or the next one of the person's plan; `None` if the person must decide.
+    fn chosen_action(&mut self) -> Result<Option<Action>, LiveError> {
         self.observe();
-        let Some(planner) = &mut self.planner else { return Ok(None) };
+        let Some(planner) = &mut self.planner else { return Ok(self.next_action.take()) };
         match planner.agent.next_action() {
             Ok(action) => Ok(Some(action)),
             Err(AgentError::Halted(_)) => Ok(None),
@@ -416,7 +440,8 @@ impl LiveSession {
             InputLevel::Plans => "plans",
             InputLevel::Steps => "steps",
         };
-        header.people[self.seat.index()].input = Some(input.to_owned());
+        let person = &mut header.people[self.seat.index()];
+        (person.input, person.is_live) = (Some(input.to_owned()), self.is_live);
         let lines = std::iter::once(header.to_line()).chain(self.lines.iter().cloned());
         lines.map(|line| line + "\n").collect()
     }

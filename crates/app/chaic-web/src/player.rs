@@ -10,11 +10,14 @@ use chaic_env::narration::{Caption, action_text};
 use chaic_env::trace::{Decision, Trace, parse};
 use chaic_env::{EnvError, Playback};
 use chaic_episodes::{Episode, EpisodeError};
-use chaic_render::{Channels, Scene, View, floor_plan};
+use chaic_render::floor_plan::{self, FloorPlan};
+use chaic_render::{Channels, Scene, View};
 use chaic_world::World;
 use serde::Serialize;
 
 use crate::drawing::DrawnImage;
+use crate::limits::{BeyondLimit, beyond_limits};
+use crate::memory_history::{MemoryHistory, MemoryState, RerunInfo, rounded};
 use crate::timeline::Timeline;
 
 /// Distance between stored states, frames: the time to any frame is that of this many frames.
@@ -71,6 +74,8 @@ pub struct ReplayInfo {
     pub timeline: Timeline,
     /// Decisions in chronological order.
     pub decisions: Vec<DecisionLine>,
+    /// Height of the map without its legend, relative to its width.
+    pub map_height: f32,
     /// Frames between the points of a trail.
     pub trail_interval: Frame,
     /// Positions of each agent on the map at multiples of `trail_interval`: distances from the left and
@@ -119,13 +124,30 @@ pub struct FrameState {
     pub belief: Option<PartnerBelief>,
 }
 
+/// State of the agents that run again beside the replay.
+#[derive(Clone, Debug, Serialize)]
+pub struct RerunState {
+    /// Frame that they have reached.
+    pub frame: Frame,
+    /// True if they run no further.
+    pub is_complete: bool,
+    /// Agreement of each agent with the replay.
+    pub agents: Vec<RerunInfo>,
+}
+
 /// Re-simulation of a trace with a movable position.
 pub struct ReplayPlayer {
     info: ReplayInfo,
     scene: Scene,
+    /// Map of the last drawn width.
+    plan: Option<FloorPlan>,
     current: Playback<Arc<Trace>>,
     /// States at multiples of [`KEYFRAME_INTERVAL`].
     keyframes: Vec<Playback<Arc<Trace>>>,
+    trace: Arc<Trace>,
+    episode: Episode,
+    /// Memories of the agents, once they run again.
+    memories: Option<MemoryHistory>,
 }
 
 impl ReplayPlayer {
@@ -163,7 +185,16 @@ impl ReplayPlayer {
         }
         let info = ReplayInfo::new(&playback, &trace, problem, timeline, trails);
         let current = keyframes[0].clone();
-        Ok(ReplayPlayer { info, scene, current, keyframes })
+        Ok(ReplayPlayer {
+            info,
+            scene,
+            plan: None,
+            current,
+            keyframes,
+            trace,
+            episode,
+            memories: None,
+        })
     }
 
     /// Returns the facts that do not change.
@@ -198,6 +229,42 @@ impl ReplayPlayer {
         }
     }
 
+    /// Runs partner and helper again, up to their next decision, so that their memories can be shown.
+    ///
+    /// # Errors
+    /// Never after [`ReplayPlayer::open`].
+    pub fn rerun_agents(&mut self) -> Result<RerunState, PlayerError> {
+        let memories = match &mut self.memories {
+            Some(memories) => memories,
+            None => {
+                let memories = MemoryHistory::new(Arc::clone(&self.trace), &self.episode)?;
+                self.memories.insert(memories)
+            }
+        };
+        let is_complete = !memories.run_to_decision();
+        Ok(RerunState { frame: memories.frame(), is_complete, agents: memories.info() })
+    }
+
+    /// Returns the memory of an agent at the current frame; `None` before
+    /// [`ReplayPlayer::rerun_agents`] has reached the frame, or if the agent does not act as recorded.
+    pub fn memory(&self, agent: AgentId) -> Option<MemoryState> {
+        let world = self.current.world();
+        let belief = self.belief().filter(|_| agent == AgentId::HELPER);
+        self.memories.as_ref()?.state(world, agent, world.state().frame, belief)
+    }
+
+    /// Returns the map in the memory of an agent at the current frame, row by row: 0 for an unknown
+    /// cell, 1 for a free and 2 for an occupied one; empty without a memory.
+    pub fn explored(&self, agent: AgentId) -> Vec<u8> {
+        let frame = self.current.world().state().frame;
+        self.memories.as_ref().map_or(Vec::new(), |memories| memories.explored(agent, frame))
+    }
+
+    /// Returns the objects that the partner cannot pick up without a chance of failure.
+    pub fn beyond_limits(&self) -> Vec<BeyondLimit> {
+        beyond_limits(self.current.world())
+    }
+
     fn belief(&self) -> Option<&PartnerBelief> {
         self.current.thoughts().get(AgentId::HELPER.index())?.belief.as_deref()
     }
@@ -219,9 +286,12 @@ impl ReplayPlayer {
 
     /// Draws the map of the current frame, with the ring of the helper's belief about the partner's
     /// position if it records one.
-    pub fn draw_map(&self, width_px: u32) -> DrawnImage {
+    pub fn draw_map(&mut self, width_px: u32) -> DrawnImage {
+        let kept = self.plan.take().filter(|plan| plan.width() == width_px);
         let world = self.current.world();
-        let mut map = floor_plan::draw_scene_plan(&self.scene, world, width_px);
+        let plan = kept.unwrap_or_else(|| FloorPlan::new(world, width_px));
+        let mut map = plan.draw(&self.scene, world);
+        self.plan = Some(plan);
         if let Some([x, z]) = self.belief().and_then(|belief| belief.position_cm) {
             let position = Vec2::new(0.01 * x as f32, 0.01 * z as f32);
             floor_plan::mark_believed_position(&mut map, world, AgentId::HELPER, position);
@@ -276,6 +346,7 @@ impl ReplayInfo {
             problem,
             timeline,
             decisions,
+            map_height: floor_plan::relative_height(world),
             trail_interval: TRAIL_INTERVAL,
             trails,
         }
@@ -285,11 +356,9 @@ impl ReplayInfo {
 /// Appends the current position of each agent to its trail.
 fn add_positions(trails: &mut [Vec<[f32; 2]>], world: &World) {
     for (trail, agent) in trails.iter_mut().zip(&world.state().agents) {
-        let at = floor_plan::position_on_map(world, to_xz(agent.pose.position));
-        // Four decimals are less than a pixel, and shorter as JSON.
-        trail.push([at.x, at.y].map(|x| (1e4 * x).round() / 1e4));
+        trail.push(rounded(floor_plan::position_on_map(world, to_xz(agent.pose.position))));
     }
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use crate::memory_view::MemoryView;
 use crate::{Action, Briefing, ClassId, Observation, observation::SensorConfig};
 
 /// Description of an agent's internal state for traces: shown in replays, never read by rules or
@@ -148,6 +149,12 @@ pub trait Agent: Send {
     /// Returns a description of the internal state, for the trace.
     fn thought(&self) -> Thought {
         Thought::default()
+    }
+
+    /// Returns the content of the memory after the last [`Agent::act`], for drawings; `None` for an
+    /// agent without a map.
+    fn memory_view(&self) -> Option<MemoryView> {
+        None
     }
 
     /// Returns the behavior, if this agent is the child; called after each [`Agent::act`].

@@ -4,7 +4,7 @@
 //! - Scene: coordinate frames ([`geom`]), ids ([`ids`]), the [`catalogue`] of object classes.
 //! - People and tasks: body capabilities ([`capability`]), the tasks ([`task`]).
 //! - Agents: the [`agent::Agent`] trait, actions ([`action`]), the [`briefing`] before an episode,
-//!   and the [`observation`] during it.
+//!   the [`observation`] during it, and the content of a memory for drawings ([`memory_view`]).
 //! - Random numbers: named streams ([`rng`]).
 //!
 //! **What it is not**: it holds no world state, reads no files and renders no images.
@@ -24,6 +24,7 @@ pub mod task;
 pub mod action;
 pub mod agent;
 pub mod briefing;
+pub mod memory_view;
 pub mod observation;
 
 pub mod rng;

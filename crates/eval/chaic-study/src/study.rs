@@ -331,7 +331,7 @@ impl Study {
     }
 
     fn play_problem(&self) -> Option<String> {
-        let PlaySettings { helper, input, world, speed, seat } = &self.play;
+        let PlaySettings { helper, speed, seat, .. } = &self.play;
         if let Some(unknown) =
             self.factors.helper.iter().chain([helper]).find(|name| !is_helper(name))
         {
@@ -345,13 +345,6 @@ impl Study {
             return Some(
                 "`factors.helper` needs `play.seat = \"partner\"` and no `factors.seat`, since the \
                  person may not be the helper"
-                    .to_owned(),
-            );
-        }
-        let mut inputs = self.factors.input.iter().chain([input]);
-        if *world == WorldPace::GoesOn && inputs.any(|input| *input == Input::Plans) {
-            return Some(
-                "`play.world = \"goes_on\"` needs `play.input = \"steps\"` and no `factors.input`"
                     .to_owned(),
             );
         }

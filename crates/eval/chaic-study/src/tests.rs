@@ -70,7 +70,6 @@ fn errors_name_the_key_and_the_expectation() {
         ("\"rhp\", \"infer\"]", "\"none\"]", "`factors.helper` must have from 2 to 16 different"),
         ("\"none\", \"rhp\", \"infer\"]", "\"rhp\"]", "`factors.helper` must have from 2"),
         ("[forms]", "seat = [\"partner\", \"helper\"]\n[forms]", "`factors.helper` needs"),
-        ("[forms]", "[play]\nworld = \"goes_on\"\n[forms]", "needs `play.input = \"steps\"`"),
         ("[forms]", "[play]\nspeed = 3\n[forms]", "`play.speed` must be 1, 2, 4 or 8, not 3"),
         ("\"trust\"", "\"trusts\"", "no form `trusts`; expected one of nasa_tlx, sus"),
         ("\"trust\"", "\"trust\", \"trust\"", "must not repeat `trust`"),

@@ -33,18 +33,67 @@ pub fn draw(world: &World, width_px: u32) -> RgbImage {
 
 /// Renders the map with an existing scene.
 pub fn draw_scene_plan(scene: &Scene, world: &World, width_px: u32) -> RgbImage {
-    let width = width_px.clamp(64, crate::MAX_SIDE_PX);
-    let area = map_area(world);
-    let size = area.size();
-    let px_per_m = width as f32 / size.x;
-    let height = ((size.y * px_per_m) as u32).clamp(1, crate::MAX_SIDE_PX);
-    let map = Map { area, px_per_m };
-    let mut image = render_base(scene, world, &map, width, height);
-    tint_rooms(&mut image, world, &map);
-    mark_objects(&mut image, world, &map);
-    mark_people(&mut image, world, &map);
-    name_rooms(&mut image, world, &map);
-    with_legend(&image, world)
+    FloorPlan::new(world, width_px).draw(scene, world)
+}
+
+/// Map of one width with the parts that do not change during an episode, for programs that draw many
+/// frames.
+#[derive(Clone, Debug)]
+pub struct FloorPlan {
+    width: u32,
+    height: u32,
+    /// Tinted pixels of each room.
+    rooms: Vec<TintedRoom>,
+}
+
+/// Pixels of a room without its walls.
+#[derive(Clone, Debug)]
+struct TintedRoom {
+    kind: RoomKind,
+    /// Start and end of rows of pixels, as indices row by row.
+    runs: Vec<(u32, u32)>,
+}
+
+impl FloorPlan {
+    /// Prepares the map of a world, `width_px` wide (between 64 and [`crate::MAX_SIDE_PX`]).
+    pub fn new(world: &World, width_px: u32) -> FloorPlan {
+        let width = width_px.clamp(64, crate::MAX_SIDE_PX);
+        let map = Map::new(world, width);
+        let height = (map.area.size().y * map.px_per_m) as u32;
+        let height = height.clamp(1, crate::MAX_SIDE_PX);
+        let rooms = tinted_rooms(world, &map, width, height);
+        FloorPlan { width, height, rooms }
+    }
+
+    /// Width in pixels.
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Renders the current frame of the world.
+    pub fn draw(&self, scene: &Scene, world: &World) -> RgbImage {
+        let map = Map::new(world, self.width);
+        let mut image = render_base(scene, world, &map, self.width, self.height);
+        self.tint_rooms(&mut image);
+        mark_objects(&mut image, world, &map);
+        mark_people(&mut image, world, &map);
+        name_rooms(&mut image, world, &map);
+        with_legend(&image, world)
+    }
+
+    /// Lightens everything but the walls, so that markers stand out, and colors it by the room.
+    fn tint_rooms(&self, image: &mut RgbImage) {
+        let pixels = image.as_chunks_mut::<3>().0;
+        for TintedRoom { kind, runs } in &self.rooms {
+            let color = room_color(*kind);
+            for (start, end) in runs {
+                for pixel in &mut pixels[*start as usize..*end as usize] {
+                    blend(pixel, [255; 3], 0.16);
+                    blend(pixel, color, 0.2);
+                }
+            }
+        }
+    }
 }
 
 /// Marks on a map of [`draw_scene_plan`] the position (x, z) at which an agent believes another
@@ -56,8 +105,7 @@ pub fn mark_believed_position(
     believer: AgentId,
     position_in_world: Vec2,
 ) {
-    let area = map_area(world);
-    let map = Map { area, px_per_m: image.width() as f32 / area.size().x };
+    let map = Map::new(world, image.width());
     let at = map.px_from_xz(position_in_world);
     let stroke_px = (0.0045 * image.width() as f32).max(2.0);
     let radius = 1.7 * person_radius_px(image, &map);
@@ -73,6 +121,12 @@ pub fn position_on_map(world: &World, position_in_world: Vec2) -> Vec2 {
     map.px_from_xz(position_in_world)
 }
 
+/// Returns the height of a map of [`draw_scene_plan`] without its legend, relative to its width.
+pub fn relative_height(world: &World) -> f32 {
+    let size = map_area(world).size();
+    size.y / size.x
+}
+
 /// Transform from meters to pixels.
 struct Map {
     area: Rect,
@@ -80,6 +134,12 @@ struct Map {
 }
 
 impl Map {
+    /// Returns the transform of a map of this width, pixels.
+    fn new(world: &World, width: u32) -> Map {
+        let area = map_area(world);
+        Map { area, px_per_m: width as f32 / area.size().x }
+    }
+
     fn px(&self, p: Vec3) -> Vec2 {
         self.px_from_xz(Vec2::new(p.x, p.z))
     }
@@ -144,23 +204,28 @@ fn room_name(kind: RoomKind) -> &'static str {
     }
 }
 
-fn tint_rooms(image: &mut RgbImage, world: &World, map: &Map) {
-    for room in &world.setup().rooms {
-        if room.kind == RoomKind::Outdoors {
-            continue;
-        }
+/// Returns the pixels of each room that no wall covers.
+fn tinted_rooms(world: &World, map: &Map, width: u32, height: u32) -> Vec<TintedRoom> {
+    let setup = world.setup();
+    let rooms = setup.rooms.iter().filter(|room| room.kind != RoomKind::Outdoors);
+    let tinted = rooms.map(|room| {
         let (a, b) = (map.px_from_xz(room.rect.min), map.px_from_xz(room.rect.max));
-        let walls: Vec<&Wall> =
-            world.setup().walls.iter().filter(|w| touches(w, &room.rect)).collect();
-        for_pixels(image, a, b, |at, pixel| {
-            // Walls stay dark. Everything else is lighter than in a room, so that markers stand
-            // out.
-            if !walls.iter().any(|w| covers(w, map.xz_from_px(at))) {
-                blend(pixel, [255; 3], 0.16);
-                blend(pixel, room_color(room.kind), 0.2);
+        let walls: Vec<&Wall> = setup.walls.iter().filter(|w| touches(w, &room.rect)).collect();
+        let is_tinted = |at| !walls.iter().any(|w| covers(w, map.xz_from_px(at)));
+        let mut runs: Vec<(u32, u32)> = Vec::new();
+        for_pixels_between((width, height), a, b, |x, y| {
+            if !is_tinted(Vec2::new(x as f32 + 0.5, y as f32 + 0.5)) {
+                return;
+            }
+            let index = y * width + x;
+            match runs.last_mut() {
+                Some((_, end)) if *end == index => *end += 1,
+                _ => runs.push((index, index + 1)),
             }
         });
-    }
+        TintedRoom { kind: room.kind, runs }
+    });
+    tinted.collect()
 }
 
 fn touches(wall: &Wall, rect: &Rect) -> bool {
@@ -317,11 +382,23 @@ fn with_legend(map: &RgbImage, world: &World) -> RgbImage {
 
 /// Calls `paint` with the center and the value of each pixel between two corners.
 fn for_pixels(image: &mut RgbImage, a: Vec2, b: Vec2, mut paint: impl FnMut(Vec2, &mut [u8; 3])) {
+    for_pixels_between(image.dimensions(), a, b, |x, y| {
+        paint(Vec2::new(x as f32 + 0.5, y as f32 + 0.5), &mut image.get_pixel_mut(x, y).0);
+    });
+}
+
+/// Calls `visit` with column and row of each pixel between two corners, row by row.
+fn for_pixels_between(
+    (width, height): (u32, u32),
+    a: Vec2,
+    b: Vec2,
+    mut visit: impl FnMut(u32, u32),
+) {
     let clip = |x: f32, n: u32| x.clamp(0.0, n as f32) as u32;
     let (low, high) = (a.min(b), a.max(b));
-    for y in clip(low.y, image.height())..clip(high.y + 1.0, image.height()) {
-        for x in clip(low.x, image.width())..clip(high.x + 1.0, image.width()) {
-            paint(Vec2::new(x as f32 + 0.5, y as f32 + 0.5), &mut image.get_pixel_mut(x, y).0);
+    for y in clip(low.y, height)..clip(high.y + 1.0, height) {
+        for x in clip(low.x, width)..clip(high.x + 1.0, width) {
+            visit(x, y);
         }
     }
 }

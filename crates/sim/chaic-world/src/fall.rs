@@ -9,6 +9,9 @@ use chaic_core::{EntityId, Quat, Vec3};
 use rapier3d::prelude::*;
 
 use crate::shape::Block;
+use boxes::BoxDispatcher;
+
+mod boxes;
 
 /// A falling object.
 #[derive(Clone, Copy, Debug)]
@@ -64,9 +67,7 @@ const FRICTION: f32 = 0.8;
 /// Simulates a joint fall among `obstacles` above the ground at y = 0, until all objects are at
 /// rest.
 pub(crate) fn fall(objects: &[Falling], obstacles: &[Obstacle], step_s: f32) -> Vec<Fall> {
-    let mut world = PhysicsWorld::new();
-    world.gravity = Vector::new(0.0, -9.81, 0.0);
-    world.integration_parameters.dt = step_s;
+    let mut world = empty_world(step_s);
     for o in obstacles {
         let collider = ColliderBuilder::cuboid(o.half.x, o.half.y, o.half.z)
             .position(rapier3d::math::Pose::from_parts(o.center, o.rotation))
@@ -107,6 +108,28 @@ pub(crate) fn fall(objects: &[Falling], obstacles: &[Obstacle], step_s: f32) -> 
         fall.on = support(&world, *collider);
     }
     falls
+}
+
+fn empty_world(step_s: f32) -> PhysicsWorld {
+    // `PhysicsWorld::new` would make the code of all pairs of shapes part of the program.
+    PhysicsWorld {
+        gravity: Vector::new(0.0, -9.81, 0.0),
+        integration_parameters: IntegrationParameters {
+            dt: step_s,
+            ..IntegrationParameters::default()
+        },
+        physics_pipeline: PhysicsPipeline::new(),
+        collision_pipeline: CollisionPipeline::new(),
+        islands: IslandManager::new(),
+        broad_phase: DefaultBroadPhase::default(),
+        narrow_phase: NarrowPhase::with_query_dispatcher(BoxDispatcher),
+        bodies: RigidBodySet::new(),
+        colliders: ColliderSet::new(),
+        impulse_joints: ImpulseJointSet::new(),
+        multibody_joints: MultibodyJointSet::new(),
+        soft_bodies: SoftBodySet::new(),
+        ccd_solver: CCDSolver::new(),
+    }
 }
 
 fn add(world: &mut PhysicsWorld, object: &Falling) -> (RigidBodyHandle, ColliderHandle) {

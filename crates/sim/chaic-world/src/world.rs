@@ -350,7 +350,10 @@ impl World {
     }
 
     /// Returns the height of an object's highest point, meters.
-    pub(crate) fn top_height_m(&self, entity: EntityId) -> f32 {
+    ///
+    /// # Panics
+    /// If there is no such object.
+    pub fn top_height_m(&self, entity: EntityId) -> f32 {
         let (spec, state) = self.object(entity);
         let half = 0.5 * spec.size_m();
         let m = glam::Mat3::from_quat(state.rotation);

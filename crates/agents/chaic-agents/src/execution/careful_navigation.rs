@@ -88,6 +88,10 @@ impl Navigator for CarefulNavigator {
         NavigationStep::Act(steer(costs, here, yaw, waypoint, &motion))
     }
 
+    fn path(&self) -> &[usize] {
+        self.path.get(self.index..).unwrap_or_default()
+    }
+
     fn reset(&mut self) {
         self.path.clear();
         self.joint_actions.clear();

@@ -42,6 +42,11 @@ pub trait Navigator: Debug + Send + Sync {
         PathState::Open
     }
 
+    /// Returns the cells of the current path from the agent on; empty without a path.
+    fn path(&self) -> &[usize] {
+        &[]
+    }
+
     /// Drops the current path.
     fn reset(&mut self);
 

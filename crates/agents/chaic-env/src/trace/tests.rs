@@ -30,6 +30,7 @@ fn header() -> Header {
             weights: None,
             recording: None,
             input: None,
+            is_live: false,
             agent: AgentId::PARTNER,
             persona: Persona::Wheelchair,
             impairments: Impairments::new(Impairment::Tremor),

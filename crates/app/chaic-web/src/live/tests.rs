@@ -13,7 +13,13 @@ fn episode() -> Vec<u8> {
 }
 
 fn config(seat: AgentId, level: InputLevel, helper: &str) -> LiveConfig {
-    LiveConfig { seed: 0, seat, level, helper: helper.to_owned() }
+    LiveConfig { seed: 0, seat, level, helper: helper.to_owned(), is_live: false }
+}
+
+/// Selects the first plan.
+fn choose_first(session: &mut LiveSession) -> bool {
+    let plans = session.state().plans;
+    plans.first().is_some_and(|plan| session.choose_plan(plan))
 }
 
 /// Plays to the end; each decision selects the first plan.
@@ -21,7 +27,7 @@ fn play(session: &mut LiveSession) {
     for _ in 0..10_000 {
         match session.advance(7).unwrap() {
             LiveStatus::Running => {}
-            LiveStatus::Waiting => assert!(session.choose_plan(0)),
+            LiveStatus::Waiting => assert!(choose_first(session)),
             LiveStatus::Ended => return,
         }
     }
@@ -63,7 +69,7 @@ fn an_episode_that_is_stopped_verifies_up_to_its_last_decision() {
     let mut session = LiveSession::start(&episode, &config).unwrap();
     for _ in 0..40 {
         if session.advance(7).unwrap() == LiveStatus::Waiting {
-            session.choose_plan(0);
+            choose_first(&mut session);
         }
     }
     let player = ReplayPlayer::open(session.trace().as_bytes(), &episode).unwrap();
@@ -79,9 +85,39 @@ fn a_person_who_decides_nothing_stops_the_world() {
     assert_eq!((state.frame, state.plans.is_empty()), (0, false));
     assert_eq!(session.advance(500).unwrap(), LiveStatus::Waiting);
     assert_eq!(session.state().frame, 0);
-    assert!(!session.choose_plan(999) && session.choose_plan(0) && !session.choose_plan(0));
+    assert!(!session.choose_plan("fly") && choose_first(&mut session));
+    assert!(!session.choose_plan(&state.plans[0]), "it acts already");
     session.advance(40).unwrap();
     assert!(session.state().frame > 0);
+}
+
+#[test]
+fn a_live_world_goes_on_while_the_person_chooses() {
+    let episode = episode();
+    let helper = config(AgentId::HELPER, InputLevel::Plans, "none");
+    let mut session =
+        LiveSession::start(&episode, &LiveConfig { is_live: true, ..helper.clone() }).unwrap();
+    assert_eq!(session.advance(60).unwrap(), LiveStatus::Waiting);
+    let state = session.state();
+    assert_eq!((state.frame, state.plans.is_empty()), (60, false));
+    assert!(session.choose_plan(&state.plans[0]));
+    assert_eq!(session.advance(30).unwrap(), LiveStatus::Running);
+    assert_ne!(session.state().caption.plan, "");
+    let mut steps = LiveSession::start(
+        &episode,
+        &LiveConfig { is_live: true, level: InputLevel::Steps, ..helper },
+    )
+    .unwrap();
+    assert_eq!(steps.advance(31).unwrap(), LiveStatus::Waiting);
+    assert!(steps.act(Action::TurnLeft) && !steps.act(Action::TurnLeft));
+    steps.advance(30).unwrap();
+    for session in [&session, &steps] {
+        let trace = session.trace();
+        assert!(trace.contains("\"is_live\":true"));
+        let player = ReplayPlayer::open(trace.as_bytes(), &episode).unwrap();
+        assert_eq!(player.info().problem, None);
+    }
+    assert!(steps.trace().contains("\"turn_left\""));
 }
 
 #[test]

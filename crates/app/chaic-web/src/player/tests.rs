@@ -10,7 +10,7 @@ use super::*;
 use chaic_env::narration::ActivityKind;
 
 /// Plays the first frames of an episode; returns the trace and the episode as files.
-fn played(id: &str, helper: &str, n_frames: Frame) -> (String, String) {
+pub(crate) fn played(id: &str, helper: &str, n_frames: Frame) -> (String, String) {
     let mut setup = find_episode(id).unwrap().into_setup();
     setup.horizon = n_frames;
     let episode = Episode::new(id, "short", None, setup).unwrap();
@@ -36,22 +36,22 @@ fn a_frame_is_the_same_however_it_is_reached() {
     assert_eq!((info.last_frame, info.length, info.problem), (450, 450, None));
     assert!(info.n_verified == info.n_decisions && info.n_decisions > 50);
     assert!(info.agents.len() == 3 && info.total > 0.0);
-    let frame = |player: &ReplayPlayer| {
+    let frame = |player: &mut ReplayPlayer| {
         let view = player.draw_view(AgentId::HELPER, 64).unwrap();
         (serde_json::to_string(&player.state()).unwrap(), view, player.draw_map(120))
     };
     player.seek(337).unwrap();
-    let expected = frame(&player);
+    let expected = frame(&mut player);
     for path in [&[450, 337][..], &[0, 336, 337], &[100, 300, 337], &[9_999, 250, 337]] {
         path.iter().for_each(|to| player.seek(*to).unwrap());
-        assert_eq!(frame(&player), expected, "{path:?}");
+        assert_eq!(frame(&mut player), expected, "{path:?}");
     }
     // Drawing other frames in between changes nothing.
     for path in [[450, 334, 335, 337], [0, 120, 250, 337], [336, 338, 339, 337]] {
         let mut last = None;
         for to in path {
             player.seek(to).unwrap();
-            last = Some(frame(&player));
+            last = Some(frame(&mut player));
         }
         assert!(last.as_ref() == Some(&expected), "{path:?}");
     }

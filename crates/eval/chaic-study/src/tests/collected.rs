@@ -126,8 +126,29 @@ fn an_export_has_verified_traces_answers_and_scores() {
         assert!(names.contains(&column.as_str()), "{column}");
     }
 
+    for key in ["@context", "@type", "name", "description"] {
+        assert!(description[key].as_str().is_some_and(|text| !text.is_empty()), "{key}");
+    }
+    for entry in fs::read_dir(out.join("data")).expect("a folder") {
+        let name = entry.expect("an entry").file_name().into_string().expect("ASCII");
+        assert!(is_psych_ds_name(&name), "{name}");
+    }
+
     let error = export(&plan, &[data], &out).expect_err("the folder is not empty");
     assert!(matches!(error, StudyError::NotEmpty { .. }), "{error}");
+}
+
+/// Returns whether a data file has a name of Psych-DS: pairs of a keyword in lower case and an
+/// alphanumeric value, joined by underscores, before `_data.csv`.
+fn is_psych_ds_name(name: &str) -> bool {
+    let Some(pairs) = name.strip_suffix("_data.csv") else { return false };
+    pairs.split('_').all(|pair| {
+        pair.split_once('-').is_some_and(|(keyword, value)| {
+            let is_keyword = keyword.chars().all(|c| c.is_ascii_lowercase());
+            let is_value = value.chars().all(|c| c.is_ascii_alphanumeric());
+            is_keyword && is_value && !keyword.is_empty() && !value.is_empty()
+        })
+    })
 }
 
 #[test]

@@ -149,6 +149,7 @@ impl PartnerEncoder {
             state: choice.state(n_wanted),
             candidates: features,
             n_candidates: candidates.len(),
+            memory: Vec::new(),
         }
     }
 }

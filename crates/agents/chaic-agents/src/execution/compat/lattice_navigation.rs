@@ -74,6 +74,8 @@ impl Hysteresis {
 pub struct LatticeNavigator {
     hysteresis: Hysteresis,
     path_state: PathState,
+    /// Path of the last step, for drawings.
+    path: Vec<usize>,
     /// Working memory of the path search, created on first use.
     search: Option<StraightSearch>,
 }
@@ -112,6 +114,7 @@ impl Navigator for LatticeNavigator {
         }
         let path = self.hysteresis.kept_path(memory).unwrap_or(path);
         let to = waypoint(memory, &path);
+        self.path.clone_from(&path.cells);
         let at = |p: Vec2| Vec3::new(p.x, 0.0, p.y);
         let error = wrap_angle(yaw_towards(at(here), at(to)) - yaw);
         if error.abs() < WALK_TURNS * memory.motion.turn_rad || to == here {
@@ -124,6 +127,10 @@ impl Navigator for LatticeNavigator {
 
     fn path_state(&self) -> PathState {
         self.path_state
+    }
+
+    fn path(&self) -> &[usize] {
+        &self.path
     }
 
     /// Does nothing: the path is replanned at every decision, and the hysteresis spans plans.

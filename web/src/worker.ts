@@ -1,13 +1,15 @@
 // Worker that re-simulates, plays and draws, so that the page stays responsive.
 
 import { initSync, Live, Player, reference_rate } from "../pkg/chaic_web.js";
-import type { LayerData, Memory, Picture, Request, RerunState, Response } from "./messages.js";
+import type { LayerData, Memory, Picture, ReplayInfo, Request, RerunState, Response, Wanted } from "./messages.js";
 
 let player: Player | undefined;
 let live: Live | undefined;
 let episode: Uint8Array | undefined;
 let seed = 0;
 let isRerunning = false;
+/** Frames that are drawn once in advance, so that browsers optimize the module before a person seeks. */
+let warmUpFrames: number[] = [];
 
 /** Longest time for which the agents run again before the worker answers requests, milliseconds. */
 const SLICE_MS = 20;
@@ -30,7 +32,7 @@ function answer(request: Request): void {
     case "open":
       initSync({ module: request.module });
       player = new Player(request.trace, request.episode);
-      send({ type: "opened", info: JSON.parse(player.info()) });
+      open(JSON.parse(player.info()));
       break;
     case "frame":
       drawFrame(request);
@@ -55,6 +57,21 @@ function answer(request: Request): void {
   }
 }
 
+function open(info: ReplayInfo): void {
+  warmUpFrames = [0.25, 0.5, 0.75].map((part) => Math.floor(part * info.last_frame));
+  send({ type: "opened", info });
+}
+
+/** Draws the next frame in advance, if no request comes first. */
+function warmUp(wanted: Wanted): void {
+  const frame = warmUpFrames.pop();
+  if (!player || frame === undefined) return;
+  player.seek(frame);
+  for (const agent of wanted.agents) player.view(agent, wanted.viewPx).free();
+  if (wanted.mapPx > 0) player.map(wanted.mapPx).free();
+  setTimeout(() => warmUp(wanted));
+}
+
 function drawFrame(request: Extract<Request, { type: "frame" }>): void {
   if (!player) return;
   const state = JSON.parse(player.seek(request.frame));
@@ -63,6 +80,7 @@ function drawFrame(request: Extract<Request, { type: "frame" }>): void {
   const pictures = map ? [...views, map] : views;
   const layers = layerData(player, request.memories, request.withLimits);
   send({ type: "frame", state, views, map, layers }, pictures.map((picture) => picture.rgba.buffer));
+  if (warmUpFrames.length > 0) setTimeout(() => warmUp(request));
 }
 
 function layerData(from: Player, agents: number[], withLimits: boolean): LayerData {

@@ -39,8 +39,9 @@ fn both_agents_run_again_and_remember_more_and_more() {
             assert!(cells.len().is_multiple_of(memory.n_columns));
             let n_seen = cells.iter().filter(|cell| **cell != 0).count();
             assert!((n_seen as f32 * 0.125 * 0.125 - seen_m2).abs() < 0.01);
+            // Some objects stand beside the part that the map shows.
+            assert!(memory.objects.iter().all(|object| object.at.iter().all(|x| x.abs() < 5.0)));
             let is_on_map = |[x, y]: [f32; 2]| (-0.1..1.1).contains(&x) && (-0.1..2.0).contains(&y);
-            assert!(memory.objects.iter().all(|object| is_on_map(object.at)));
             assert!(memory.path.iter().all(|at| is_on_map(*at)), "{memory:?}");
         }
         assert!(seen_m2 > 1.0);

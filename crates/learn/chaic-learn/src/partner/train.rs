@@ -122,7 +122,7 @@ impl PartnerCloningConfig {
     fn read_recordings(&self, part: Part) -> Result<Option<Vec<Recording>>, TrainingError> {
         let Some(path) = &self.recordings else { return Ok(None) };
         let all = read_recordings(path).map_err(TrainingError::from_data)?;
-        let is_held_out = |k: usize| k % VALIDATION_INTERVAL == 0;
+        let is_held_out = |k: usize| k.is_multiple_of(VALIDATION_INTERVAL);
         let all = all.iter().enumerate();
         let chosen = all.filter(|(k, _)| is_held_out(*k) == (part == Part::Validation));
         Ok(Some(chosen.map(|(_, recording)| recording.clone()).collect()))

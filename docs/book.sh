@@ -3,13 +3,16 @@
 # target/debug/chaic. It needs mdbook. The pages in book/replays use no network and work from a disk.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-chaic=${1:-target/release/chaic}
-run=$(mktemp -d)
-trap 'rm -rf "$run"' EXIT
+chaic=$(realpath "${1:-target/release/chaic}")
+replays=$PWD/book/replays
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
 
 mdbook build
-mkdir -p book/replays
-"$chaic" eval -q --task low_target,high_goal,obstacle --n-episodes 1 --helper none,rhp,infer --out "$run/run"
-"$chaic" view "$run/run" --out book/replays/tasks.html
-"$chaic" view "$run/run" --helper rhp --out book/replays/rhp.html
-"$chaic" play low_target/test/00 --out book/replays/play.html
+mkdir -p "$replays"
+# Titles of the pages name the run's path.
+cd "$work"
+"$chaic" eval -q --task low_target,high_goal,obstacle --n-episodes 1 --helper none,rhp,infer --out benchmark
+"$chaic" view benchmark --out "$replays/tasks.html"
+"$chaic" view benchmark --helper rhp --out "$replays/rhp.html"
+"$chaic" play low_target/test/00 --out "$replays/play.html"

@@ -3,7 +3,9 @@
 # target/debug/chaic. It needs mdbook. The pages in book/replays use no network and work from a disk.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-chaic=$(realpath "${1:-target/release/chaic}")
+chaic=${1:-target/release/chaic}
+[ -x "$chaic" ] || { echo "error: $chaic is missing; build it with: cargo build --release" >&2 && exit 1; }
+chaic=$(realpath "$chaic")
 replays=$PWD/book/replays
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT

@@ -31,10 +31,10 @@ declare module "*/chaic_web.js" {
     seek(frame: number): string;
     view(agent: number, side: number): Picture;
     rerun_agents(): string;
-  memory(agent: number): string;
-  explored(agent: number): Uint8Array;
-  beyond_limits(): string;
-  map(width: number): Picture;
+    memory(agent: number): string;
+    explored(agent: number): Uint8Array;
+    beyond_limits(): string;
+    map(width: number): Picture;
     free(): void;
   }
 }

@@ -170,7 +170,7 @@ impl CandidateScorer {
         Pass::new(&self.network, widest())
     }
 
-    /// Returns the numbers of input rows per decision.
+    /// Returns the number of input rows of a decision.
     fn n_rows(&self, decision: &CandidateSet) -> usize {
         1 + decision.n_candidates + decision.memory.len() / (self.n_state + self.n_candidate)
     }

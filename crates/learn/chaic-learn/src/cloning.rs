@@ -126,6 +126,11 @@ impl Policy for ExpertPolicy {
         let told = self.told(context.briefing);
         let briefing = told.as_ref().unwrap_or(context.briefing);
         let expert_plan = self.expert.choose(&Context { briefing, ..*context }, valid)?;
+        // If the expert's plan does not replace the current one, the label is to continue.
+        let continues =
+            reconsidered.is_some_and(|current| !self.expert.supersedes(&expert_plan, &current));
+        let chosen = candidates.iter().position(|plan| *plan == expert_plan);
+        let action = if continues { Some(0) } else { chosen };
         let frame = context.memory.frame;
         let plan = match (&mut self.actor, &decision) {
             (RolloutActor::Learner(learner), Some(decision)) => {
@@ -133,15 +138,10 @@ impl Policy for ExpertPolicy {
             }
             (RolloutActor::Learner(learner), None) => learner.choose(context, valid)?,
             (RolloutActor::Expert(features), _) => {
-                features.record(expert_plan, frame);
+                features.record(expert_plan, action, frame);
                 expert_plan
             }
         };
-        // If the expert's plan does not replace the current one, the label is to continue.
-        let continues =
-            reconsidered.is_some_and(|current| !self.expert.supersedes(&expert_plan, &current));
-        let chosen = candidates.iter().position(|plan| *plan == expert_plan);
-        let action = if continues { Some(0) } else { chosen };
         // Plans outside the candidates, such as waiting, cannot be learned.
         if let (Some(action), Some(observation)) = (action, decision) {
             let record = StepRecord { frame, observation, action, log_prob: 0.0, value: 0.0 };

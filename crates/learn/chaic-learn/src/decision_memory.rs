@@ -5,20 +5,19 @@ use std::collections::VecDeque;
 use chaic_core::Frame;
 
 use crate::candidate_scorer::CandidateSet;
-use crate::scales::normalize_clamped;
+use crate::scales::{TIME_SCALE_FRAMES, normalize_clamped};
 
 /// Number of additional features per row with memory: whether the row is an earlier decision, and its
 /// age. Both are 0 for the candidates of this decision.
 pub const N_MEMORY_PLAN: usize = 2;
-/// Scale of ages, frames: an episode.
-const AGE_SCALE_FRAMES: f32 = 3000.0;
 
 /// The last decisions between several candidates.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct DecisionMemory {
     capacity: usize,
     decisions: VecDeque<EarlierDecision>,
-    pending: Option<PendingDecision>,
+    /// Encoded decision, before the rows got [`N_MEMORY_PLAN`], whose choice is not known yet.
+    pending: Option<CandidateSet>,
 }
 
 /// Decision whose choice is known.
@@ -27,14 +26,6 @@ struct EarlierDecision {
     frame: Frame,
     /// State features and features of the chosen candidate, without [`N_MEMORY_PLAN`].
     features: Vec<f32>,
-}
-
-/// Encoded decision whose choice is not known yet.
-#[derive(Clone, Debug, PartialEq)]
-struct PendingDecision {
-    state: Vec<f32>,
-    candidates: Vec<f32>,
-    n_candidates: usize,
 }
 
 impl DecisionMemory {
@@ -51,16 +42,11 @@ impl DecisionMemory {
 
     /// Adds the earlier decisions to an encoded decision.
     pub(crate) fn add_to(&mut self, encoded: &mut CandidateSet, frame: Frame) {
-        let n_candidates = encoded.n_candidates;
-        if self.capacity == 0 || n_candidates == 0 {
+        if self.capacity == 0 || encoded.n_candidates == 0 {
             return;
         }
-        self.pending = Some(PendingDecision {
-            state: encoded.state.clone(),
-            candidates: encoded.candidates.clone(),
-            n_candidates,
-        });
-        let rows = encoded.candidates.chunks_exact(encoded.candidates.len() / n_candidates);
+        let pending = self.pending.insert(encoded.clone());
+        let rows = pending.candidates.chunks_exact(pending.candidates.len() / pending.n_candidates);
         encoded.candidates =
             rows.flat_map(|row| row.iter().copied().chain([0.0; N_MEMORY_PLAN])).collect();
         encoded.memory = self.decisions.iter().flat_map(|decision| decision.row(frame)).collect();
@@ -70,7 +56,7 @@ impl DecisionMemory {
     /// else, which is not remembered.
     pub(crate) fn record(&mut self, chosen: Option<usize>, frame: Frame) {
         let (Some(pending), Some(chosen)) = (self.pending.take(), chosen) else { return };
-        let PendingDecision { state, candidates, n_candidates } = pending;
+        let CandidateSet { state, candidates, n_candidates, .. } = pending;
         let n = candidates.len() / n_candidates;
         let features = [&state[..], &candidates[chosen * n..][..n]].concat();
         if self.decisions.len() == self.capacity {
@@ -84,7 +70,7 @@ impl EarlierDecision {
     /// Returns the input row at a later frame.
     fn row(&self, frame: Frame) -> impl Iterator<Item = f32> + '_ {
         let age = frame.saturating_sub(self.frame) as f32;
-        let age_features: [f32; N_MEMORY_PLAN] = [1.0, normalize_clamped(age, AGE_SCALE_FRAMES)];
+        let age_features: [f32; N_MEMORY_PLAN] = [1.0, normalize_clamped(age, TIME_SCALE_FRAMES)];
         self.features.iter().copied().chain(age_features)
     }
 }

@@ -80,6 +80,17 @@ impl Demonstrations {
         write_atomically(&path(folder, iteration), &bytes)
     }
 
+    /// Returns the demonstrations of the latest `max_episodes` episodes, with these added.
+    pub fn with<'a>(
+        &'a self,
+        episodes: &'a [Vec<Demonstration>],
+        max_episodes: usize,
+    ) -> Vec<&'a [Demonstration]> {
+        let n_surplus = (self.episodes.len() + episodes.len()).saturating_sub(max_episodes);
+        let all = self.episodes.iter().chain(episodes).map(Vec::as_slice);
+        all.skip(n_surplus).collect()
+    }
+
     /// Adds episodes and drops the oldest beyond `max_episodes`.
     pub fn add(&mut self, episodes: Vec<Vec<Demonstration>>, max_episodes: usize) {
         self.episodes.extend(episodes);
@@ -122,6 +133,9 @@ fn from_sections(
         return Err(CheckpointError::section(ACTIONS, "does not fit the candidates"));
     }
     let memory_lens = file.integers(MEMORY_LENS, n)?;
+    if memory_lens.iter().any(|len| !len.is_multiple_of((n_state + n_plan) as u64)) {
+        return Err(CheckpointError::section(MEMORY_LENS, "does not fit the features"));
+    }
     let n_memory = memory_lens.iter().fold(0, |sum: usize, n| sum.saturating_add(*n as usize));
     let mut memory = file.floats(MEMORY, n_memory)?.iter().copied();
     let mut rows = candidates.chunks_exact(n_plan);

@@ -22,7 +22,9 @@ use crate::opponent::network::{N_GOALS, OpponentModel, OpponentPrediction};
 use crate::opponent::tracker::OpponentTracker;
 use crate::opponent::{N_LIMITS, OpponentGoal};
 use crate::plan_history::PlanHistory;
-use crate::scales::{TARGET_SETS, flag, log_mass, normalize_clamped, recency};
+use crate::scales::{
+    DISTANCE_SCALE_M, TARGET_SETS, TIME_SCALE_FRAMES, flag, log_mass, normalize_clamped, recency,
+};
 
 /// Features of the state. Three per target set follow: the number of its objects that the partner
 /// is believed to have taken, the number available, and the probability that it is the partner's.
@@ -115,9 +117,6 @@ pub const N_PROPOSAL_PLAN: usize = 1;
 /// Number of kinds of plans.
 const N_KINDS: usize = Plan::KINDS.len();
 
-/// Scales of distances (m) and durations (frames).
-const DISTANCE_SCALE_M: f32 = 20.0;
-const TIME_SCALE_FRAMES: f32 = 3000.0;
 /// Approximate walking speed, meters per frame, to estimate the remaining time.
 const WALKING_M_PER_FRAME: f32 = 0.04;
 
@@ -157,8 +156,6 @@ pub struct FeatureEncoder {
     /// The helper `infer`, whose choices are marked.
     proposer: Option<InferPolicy>,
     memory: DecisionMemory,
-    /// Candidates of the last encoding.
-    candidates: Vec<Plan>,
 }
 
 /// Inputs of a policy besides those of memory and belief.
@@ -181,7 +178,6 @@ impl FeatureEncoder {
             opponent: inputs.opponent.map(OpponentTracker::new),
             proposer: inputs.has_proposals.then(|| InferPolicy::new(InferOptions::ALL)),
             memory: DecisionMemory::new(inputs.memory),
-            candidates: Vec::new(),
         }
     }
 
@@ -246,14 +242,13 @@ impl FeatureEncoder {
             encoded.candidates = rows.zip(candidates).flat_map(mark).collect();
         }
         self.memory.add_to(&mut encoded, context.memory.frame);
-        self.candidates = candidates.to_vec();
         encoded
     }
 
-    /// Records the choice of a plan at a frame, after its encoding if there were several candidates.
-    pub fn record(&mut self, plan: Plan, frame: Frame) {
+    /// Records the choice of a plan at a frame. `chosen` is the index of the adopted plan among the
+    /// candidates of the last encoding; `None` if there was no encoding or it is no candidate.
+    pub fn record(&mut self, plan: Plan, chosen: Option<usize>, frame: Frame) {
         self.history.record(plan, frame);
-        let chosen = self.candidates.iter().position(|candidate| *candidate == plan);
         self.memory.record(chosen, frame);
     }
 

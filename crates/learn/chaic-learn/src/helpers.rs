@@ -87,8 +87,8 @@ impl PartnerPolicy {
         let bytes = read_user_file(path, MAX_BYTES).map_err(PolicyError::from)?;
         let weights_error = |problem| PolicyError::Weights { path: path.to_owned(), problem };
         let weights = PartnerWeights::from_bytes(&bytes).map_err(weights_error)?;
-        let digest = weights.digest.clone().expect("it is from a file");
-        Ok(PartnerPolicy { name: format!("{POLICY}{digest}"), weights: Arc::new(weights) })
+        let name = format!("{POLICY}{}", weights.digest);
+        Ok(PartnerPolicy { name, weights: Arc::new(weights) })
     }
 
     /// Name of the partner in runs: `policy:` and the digest of its weights.

@@ -119,7 +119,7 @@ impl LearnedPolicy {
             ActionSelection::Greedy => output.argmax(),
         };
         let plan = candidates[action];
-        self.features.record(plan, frame);
+        self.features.record(plan, Some(action), frame);
         if let Some(log) = &self.log {
             let record = StepRecord {
                 frame,
@@ -144,7 +144,7 @@ impl Policy for LearnedPolicy {
         let candidates = self.features.history.candidates(valid);
         let frame = context.memory.frame;
         if let [single] = candidates[..] {
-            self.features.record(single, frame);
+            self.features.record(single, None, frame);
             return Ok(single);
         }
         let observation = self.features.encode(context, valid, &candidates);

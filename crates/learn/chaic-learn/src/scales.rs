@@ -15,6 +15,10 @@ pub const TARGET_SETS: [TargetSet; 8] = [
     TargetSet::Furniture,
 ];
 
+/// Scale of path lengths and distances between objects, meters: about a house.
+pub const DISTANCE_SCALE_M: f32 = 20.0;
+/// Scale of durations, frames: an episode.
+pub const TIME_SCALE_FRAMES: f32 = 3000.0;
 /// Frames after which [`recency`] falls to 1/e.
 const RECENCY_FRAMES: f32 = 120.0;
 

@@ -499,9 +499,7 @@ impl Algorithm for CloningConfig {
         let tr = labeled.iter().map(|(_, tr)| tr).sum::<f64>() / labeled.len().max(1) as f64;
         let episodes: Vec<Vec<Demonstration>> =
             labeled.into_iter().map(|(demonstrations, _)| demonstrations).collect();
-        let all = data.episodes.iter().chain(&episodes).map(|episode| &episode[..]);
-        let n_surplus = (data.episodes.len() + episodes.len()).saturating_sub(self.max_episodes);
-        let all: Vec<&[Demonstration]> = all.skip(n_surplus).collect();
+        let all = data.with(&episodes, self.max_episodes);
         let learning_rate =
             learning_rate_at(state.iterations, self.learning_rate, 1, self.iterations);
         if self.rollout.normalize {

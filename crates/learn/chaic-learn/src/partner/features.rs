@@ -9,7 +9,9 @@ use chaic_core::task::SceneKind;
 use chaic_core::{ClassId, Frame, Role, Vec3};
 
 use crate::candidate_scorer::CandidateSet;
-use crate::scales::{flag, log_mass, normalize_clamped, recency};
+use crate::scales::{
+    DISTANCE_SCALE_M, TIME_SCALE_FRAMES, flag, log_mass, normalize_clamped, recency,
+};
 
 /// Number of kinds of plans.
 const N_KINDS: usize = Plan::KINDS.len();
@@ -80,9 +82,6 @@ pub fn nearest_wanted(observation: &CandidateSet) -> Option<usize> {
     rows.map(|row| row[N_KINDS + feature]).position(|flag| flag > 0.0)
 }
 
-/// Scales of distances (m) and durations (frames).
-const DISTANCE_SCALE_M: f32 = 20.0;
-const TIME_SCALE_FRAMES: f32 = 3000.0;
 /// Scale of the speed, meters per frame: twice that of an adult.
 const SPEED_SCALE: f32 = 0.1;
 /// Scale of heights, meters.

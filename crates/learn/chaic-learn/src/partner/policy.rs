@@ -32,8 +32,8 @@ pub struct PartnerWeights {
     pub model: CandidateScorer,
     /// Parameters.
     pub parameters: Vec<f32>,
-    /// Digest of the weights file, if they are from one.
-    pub digest: Option<String>,
+    /// Digest of the weights file.
+    pub digest: String,
 }
 
 impl PartnerWeights {
@@ -44,7 +44,7 @@ impl PartnerWeights {
     pub fn from_bytes(bytes: &[u8]) -> Result<PartnerWeights, WeightsError> {
         let model = partner_network();
         let parameters = weights::from_bytes(&model.network, bytes, PARTNER_KIND)?;
-        Ok(PartnerWeights { model, parameters, digest: Some(weights::digest(bytes)) })
+        Ok(PartnerWeights { model, parameters, digest: weights::digest(bytes) })
     }
 
     /// Creates a partner that samples its plans from the distribution that it learned.
@@ -116,7 +116,7 @@ impl Policy for LearnedPartnerPolicy {
     }
 
     fn weights(&self) -> Option<String> {
-        self.weights.digest.clone()
+        Some(self.weights.digest.clone())
     }
 
     fn fork(&self) -> Option<LearnedPartnerPolicy> {

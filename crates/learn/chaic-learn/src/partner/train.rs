@@ -348,10 +348,8 @@ impl Trainer for PartnerCloningTrainer {
             .into_iter()
             .map(|decisions| decisions.into_iter().map(demonstration).collect())
             .collect();
-        let mut data = self.data.clone();
-        data.add(episodes.clone(), self.config.max_episodes);
-        let all: Vec<&[Demonstration]> = data.episodes.iter().map(Vec::as_slice).collect();
         let config = &self.config;
+        let all = self.data.with(&episodes, config.max_episodes);
         let learning_rate =
             learning_rate_at(self.iterations, config.learning_rate, 1, config.iterations);
         let fit_config = FitConfig {
@@ -369,7 +367,7 @@ impl Trainer for PartnerCloningTrainer {
             return Ok(None);
         };
         Demonstrations::write(&self.folder, self.iterations, &episodes, &self.identity())?;
-        self.data = data;
+        self.data.add(episodes, self.config.max_episodes);
         self.iterations += 1;
         let n = self.data.episodes.iter().map(Vec::len).sum::<usize>() as f64;
         Ok(Some(metrics([("demonstrations", n), ("loss", loss), ("agreement", agreement)])))

@@ -169,6 +169,11 @@ test("layers of the map show what both agents know, by keyboard and in words", a
   }
   assert.match(text, /Its belief equals the recorded one/);
   assert.match(text, /the partner \(.+\) reaches tops from 0\.25 to 1\.50 m/);
+  const chart = page.locator("chaic-replay svg.limits");
+  const beyond = await page.locator("chaic-replay .words li").count();
+  assert.equal(await chart.locator("text.beyond").count(), beyond);
+  assert.ok((await chart.locator("circle").count()) > 0, "objects within the limits");
+  assert.ok((await chart.locator(".region").boundingBox()).height > 20);
   assert.deepEqual(await findings(page), []);
   assert.ok((await scrollWidth(page)) <= 320);
   assert.equal((await layerColor(page, 0.5, 0.99))[3], 0, "the legend is free");

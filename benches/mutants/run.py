@@ -42,14 +42,19 @@ class Area:
     test_arguments: tuple[str, ...] = ()
 
 
+# The integration tests of chaic-eval concern helpers. Tests of interruptions take most of the time of the others.
+EVAL_TESTS = ("--lib", "--", "--skip", "merging", "--skip", "starting")
 AREAS = {
     "world": Area(("crates/sim/chaic-world/src/**",), ("chaic-world", "chaic-reference")),
-    # The integration tests of chaic-eval concern helpers.
-    "metrics": Area(("crates/eval/chaic-eval/src/metrics/**",), ("chaic-eval",), ("--lib",)),
+    "metrics": Area(
+        ("crates/eval/chaic-eval/src/metrics/**",),
+        ("chaic-eval",),
+        (*EVAL_TESTS, "--skip", "forging"),
+    ),
     "verify": Area(
         ("crates/eval/chaic-eval/src/verify.rs", "crates/eval/chaic-eval/src/verify/**"),
         ("chaic-eval",),
-        ("--lib",),
+        EVAL_TESTS,
     ),
     "grants": Area(
         ("crates/agents/chaic-env/src/observer.rs", "crates/agents/chaic-env/src/track.rs"),

@@ -33,7 +33,7 @@ declare module "*/chaic_web.js" {
     rerun_agents(): string;
     memory(agent: number): string;
     explored(agent: number): Uint8Array;
-    beyond_limits(): string;
+    task_objects(): string;
     map(width: number): Picture;
     free(): void;
   }

@@ -2,6 +2,7 @@
 
 import { html, nothing, type ReactiveControllerHost, type TemplateResult } from "lit";
 import { clock } from "./frames.js";
+import { LIMIT_MARKS, limitsChart } from "./limits_chart.js";
 import type { LayerData, Memory, Place, ReplayInfo, RerunInfo, RerunState } from "./messages.js";
 
 /** Layers that a reader can show. */
@@ -9,7 +10,7 @@ type Layer = "truth" | "partner" | "helper" | "limits" | "explored" | "objects" 
 
 const PARTNER = 0;
 const HELPER = 1;
-const NO_DATA: LayerData = { memories: [], beyond: [] };
+const NO_DATA: LayerData = { memories: [], objects: [] };
 
 /** Names of the agents, and their colors on the map. */
 const NAMES = ["partner", "helper"];
@@ -34,12 +35,6 @@ const ONLY = [
 ];
 /** Probability from which an object counts as wanted, per mille. */
 const WANTED = 500;
-
-const LIMITS = {
-  too_high: { mark: "↑", text: "too high" },
-  too_low: { mark: "↓", text: "too low" },
-  too_heavy: { mark: "■", text: "too heavy" },
-};
 
 /** Chosen layers, their data, and how they are drawn. */
 export class MapLayers {
@@ -104,8 +99,8 @@ export class MapLayers {
       if (this.shown.has("paths")) drawPath(context, memory);
       if (this.shown.has("objects")) drawObjects(context, memory);
     }
-    for (const { at, limits } of data.beyond) {
-      drawText(context, [at[0] + 0.012, at[1]], limits.map((limit) => LIMITS[limit].mark).join(""), INK);
+    for (const { at, limits } of data.objects) {
+      drawText(context, [at[0] + 0.012, at[1]], limits.map((limit) => LIMIT_MARKS[limit].mark).join(""), INK);
     }
   }
 
@@ -187,18 +182,24 @@ export class MapLayers {
   }
 
   private limitsInWords({ agents }: ReplayInfo): TemplateResult {
-    const partner = agents[PARTNER];
-    const [low, high] = (partner?.reach_m ?? [0, 0]).map((m) => m.toFixed(2));
-    const { beyond } = this.data;
+    const partner = agents[PARTNER]!;
+    const [low, high] = partner.reach_m.map((m) => m.toFixed(2));
+    const { objects } = this.data;
+    const beyond = objects.filter((object) => object.limits.length > 0);
     return html`<p>
-        <b>Limits</b>: the partner (${partner?.person ?? ""}) reaches tops from ${low} to ${high} m and lifts
-        ${partner?.strength_kg.toFixed(0)} kg.
+        <b>Limits</b>: the partner (${partner.person}) reaches tops from ${low} to ${high} m and lifts
+        ${partner.strength_kg.toFixed(0)} kg.
         ${beyond.length === 0 ? "No object of the task is beyond these limits." : "Beyond these limits:"}
+      </p>
+      ${limitsChart(partner, objects)}
+      <p class="small">
+        Objects of the task by mass and height of their tops. The region is what the partner can pick up; circles are in
+        it.
       </p>
       <ul>
         ${beyond.map(
           ({ name, limits, top_m, mass_kg }) => html`<li>
-            ${limits.map((limit) => LIMITS[limit].mark)} ${name}: ${limits.map((limit) => LIMITS[limit].text).join(", ")}
+            ${limits.map((limit) => LIMIT_MARKS[limit].mark)} ${name}: ${limits.map((limit) => LIMIT_MARKS[limit].text).join(", ")}
             (top at ${top_m.toFixed(2)} m, ${mass_kg.toFixed(1)} kg)
           </li>`,
         )}

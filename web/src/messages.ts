@@ -126,10 +126,11 @@ export interface Memory {
   cells: Uint8Array;
 }
 
-/** Object that the partner cannot pick up without a chance of failure. */
-export interface BeyondLimit {
+/** Movable object of the goal, container or obstacle. */
+export interface TaskObject {
   name: string;
   at: Place;
+  /** Limits of the partner that it exceeds. */
   limits: ("too_high" | "too_low" | "too_heavy")[];
   top_m: number;
   mass_kg: number;
@@ -138,7 +139,8 @@ export interface BeyondLimit {
 /** Layers of the map that need data of the worker. */
 export interface LayerData {
   memories: Memory[];
-  beyond: BeyondLimit[];
+  /** Objects of the task; empty if the limits of the partner are not shown. */
+  objects: TaskObject[];
 }
 
 /** Image for a canvas. */
@@ -203,7 +205,7 @@ export interface Wanted {
   mapPx: number;
   /** Agents whose memories are shown. */
   memories: number[];
-  /** True if the objects beyond the limits of the partner are shown. */
+  /** True if the limits of the partner are shown. */
   withLimits: boolean;
 }
 

@@ -130,6 +130,31 @@ export const styles = css`
     margin: 0;
     padding-left: 1.5rem;
   }
+  svg.limits {
+    display: block;
+    max-width: 26rem;
+    width: 100%;
+  }
+  .limits .region {
+    fill: var(--partner);
+    fill-opacity: 0.15;
+    stroke: var(--partner);
+  }
+  .limits line {
+    stroke: var(--line);
+  }
+  .limits text {
+    fill: var(--ink);
+    font-size: 12px;
+  }
+  .limits text.beyond {
+    font-size: 15px;
+    font-weight: 700;
+  }
+  .limits circle {
+    fill: var(--ink);
+    fill-opacity: 0.7;
+  }
   .trails polyline {
     fill: none;
     stroke: var(--agent);

@@ -88,7 +88,7 @@ function layerData(from: Player, agents: number[], withLimits: boolean): LayerDa
     const memory: Memory | null = JSON.parse(from.memory(agent));
     return memory ? [{ ...memory, cells: from.explored(agent) }] : [];
   });
-  return { memories, beyond: withLimits ? JSON.parse(from.beyond_limits()) : [] };
+  return { memories, objects: withLimits ? JSON.parse(from.task_objects()) : [] };
 }
 
 /** Runs the agents again in slices, so that frames are drawn meanwhile. */

@@ -85,12 +85,12 @@ impl Player {
         self.player.explored(AgentId(agent))
     }
 
-    /// Returns a list of [`crate::BeyondLimit`].
+    /// Returns a list of [`crate::TaskObject`].
     ///
     /// # Errors
     /// Never in practice.
-    pub fn beyond_limits(&self) -> Result<String, JsError> {
-        json(&self.player.beyond_limits())
+    pub fn task_objects(&self) -> Result<String, JsError> {
+        json(&self.player.task_objects())
     }
 
     /// Draws the map.

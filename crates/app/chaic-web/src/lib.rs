@@ -18,7 +18,7 @@ mod player;
 mod timeline;
 
 pub use drawing::DrawnImage;
-pub use limits::{BeyondLimit, Limit};
+pub use limits::{Limit, TaskObject};
 pub use live::{
     InputLevel, LiveConfig, LiveError, LiveInfo, LiveSession, LiveState, LiveStatus, PERSON,
     reference,

@@ -1,4 +1,4 @@
-//! Objects beyond the limits of the partner.
+//! Objects of the task, and the limits of the partner.
 
 use chaic_core::geom::to_xz;
 use chaic_core::{AgentId, Role};
@@ -20,14 +20,14 @@ pub enum Limit {
     TooHeavy,
 }
 
-/// Object beyond a limit of the partner.
+/// Object of the task that lies or stands somewhere or is held.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct BeyondLimit {
+pub struct TaskObject {
     /// Class and number, for example `apple #31`.
     pub name: String,
     /// Position on the map, relative to its width.
     pub at: [f32; 2],
-    /// Limits.
+    /// Limits of the partner that it exceeds.
     pub limits: Vec<Limit>,
     /// Height of its top, meters.
     pub top_m: f32,
@@ -35,9 +35,9 @@ pub struct BeyondLimit {
     pub mass_kg: f32,
 }
 
-/// Returns the objects of the goal, containers and obstacles that the partner cannot pick up without a
-/// chance of failure.
-pub fn beyond_limits(world: &World) -> Vec<BeyondLimit> {
+/// Returns the movable objects of the goal, containers and obstacles, without delivered and broken ones.
+/// An object that exceeds a limit cannot be picked up by the partner without a chance of failure.
+pub fn task_objects(world: &World) -> Vec<TaskObject> {
     let setup = world.setup();
     let Some(partner) = setup.people.get(AgentId::PARTNER.index()) else { return Vec::new() };
     let capability = partner.capability();
@@ -49,7 +49,7 @@ pub fn beyond_limits(world: &World) -> Vec<BeyondLimit> {
         let is_done = state.location == ObjectLocation::Broken || state.delivered.is_some();
         matters && !thing.fixed && !is_done
     });
-    let beyond = movable.filter_map(|((entity, thing), state)| {
+    let objects = movable.map(|((entity, thing), state)| {
         let (top_m, info) = (world.top_height_m(entity), thing.class.info());
         let checks = [
             (top_m > high_m, Limit::TooHigh),
@@ -61,13 +61,13 @@ pub fn beyond_limits(world: &World) -> Vec<BeyondLimit> {
             .filter(|(is_beyond, _)| *is_beyond)
             .map(|(_, limit)| limit)
             .collect();
-        (!limits.is_empty()).then(|| BeyondLimit {
+        TaskObject {
             name: format!("{} #{}", info.label, entity.0),
             at: rounded(floor_plan::position_on_map(world, to_xz(state.position))),
             limits,
             top_m,
             mass_kg: info.mass_kg,
-        })
+        }
     });
-    beyond.collect()
+    objects.collect()
 }

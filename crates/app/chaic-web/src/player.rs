@@ -16,7 +16,7 @@ use chaic_world::World;
 use serde::Serialize;
 
 use crate::drawing::DrawnImage;
-use crate::limits::{BeyondLimit, beyond_limits};
+use crate::limits::{TaskObject, task_objects};
 use crate::memory_history::{MemoryHistory, MemoryState, RerunInfo, rounded};
 use crate::timeline::Timeline;
 
@@ -260,9 +260,10 @@ impl ReplayPlayer {
         self.memories.as_ref().map_or(Vec::new(), |memories| memories.explored(agent, frame))
     }
 
-    /// Returns the objects that the partner cannot pick up without a chance of failure.
-    pub fn beyond_limits(&self) -> Vec<BeyondLimit> {
-        beyond_limits(self.current.world())
+    /// Returns the objects of the task at the current frame, with the limits of the partner that they
+    /// exceed.
+    pub fn task_objects(&self) -> Vec<TaskObject> {
+        task_objects(self.current.world())
     }
 
     fn belief(&self) -> Option<&PartnerBelief> {

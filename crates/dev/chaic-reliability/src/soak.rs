@@ -1,6 +1,8 @@
 //! Many episodes in one process, with its memory, descriptors and threads.
 
 use std::ffi::OsString;
+use std::fs::File;
+use std::io::{Read as _, Seek as _, SeekFrom};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -87,9 +89,9 @@ fn play(at: &Path, n_seeds: u32, journal: &Path) -> (u8, Vec<Sample>) {
     let has_ended = AtomicBool::new(false);
     std::thread::scope(|scope| {
         let sampler = scope.spawn(|| {
-            let mut samples = Vec::new();
+            let (mut lines, mut samples) = (LineCounter::default(), Vec::new());
             while !has_ended.load(Ordering::Relaxed) {
-                samples.extend(sample(journal));
+                samples.extend(lines.count(journal).map(sample));
                 std::thread::sleep(PERIOD);
             }
             samples
@@ -100,9 +102,32 @@ fn play(at: &Path, n_seeds: u32, journal: &Path) -> (u8, Vec<Sample>) {
     })
 }
 
-/// Returns the state of this process; `None` before the first episode has ended.
-fn sample(journal: &Path) -> Option<Sample> {
-    let n_episodes = std::fs::read(journal).ok()?.iter().filter(|byte| **byte == b'\n').count();
+/// Returns the state of this process after this number of episode runs.
+fn sample(n_episodes: usize) -> Sample {
     let (memory_kib, descriptors, threads) = (memory_kib(), descriptors(), threads());
-    (n_episodes > 0).then_some(Sample { n_episodes, memory_kib, descriptors, threads })
+    Sample { n_episodes, memory_kib, descriptors, threads }
+}
+
+/// Number of lines of a growing file, which is read piece by piece.
+#[derive(Debug, Default)]
+struct LineCounter {
+    n_lines: usize,
+    n_bytes: u64,
+}
+
+impl LineCounter {
+    /// Returns the number of complete lines; `None` before the first one.
+    fn count(&mut self, path: &Path) -> Option<usize> {
+        let mut file = File::open(path).ok()?;
+        file.seek(SeekFrom::Start(self.n_bytes)).ok()?;
+        let mut buffer = [0; 4096];
+        loop {
+            let n = file.read(&mut buffer).ok()?;
+            if n == 0 {
+                return (self.n_lines > 0).then_some(self.n_lines);
+            }
+            self.n_bytes += n as u64;
+            self.n_lines += buffer[..n].iter().filter(|byte| **byte == b'\n').count();
+        }
+    }
 }

@@ -90,7 +90,7 @@ impl Run {
             (None, None) => return Err(EvalError::NotARun { path: path.to_owned() }),
         };
         let (mut journal, results, warnings) = Journal::open(&folder.results(), &planned)?;
-        journal.compact(results.iter())?;
+        journal.compact(&results)?;
         let is_traced =
             |r: &RunResult| !options.traces || r.summary().is_none() || folder.has_trace(&r.key);
         let (results, untraced) = results.into_iter().partition(is_traced);
@@ -220,8 +220,9 @@ impl Run {
             .filter(|job| !done.contains(&job.key))
             .cloned()
             .collect();
-        let (journal, results) = (&mut self.journal, &mut self.results);
-        let untraced = &mut self.untraced;
+        // The memory of a long run stays constant: its results are read from the journal at the end.
+        self.results = Vec::new();
+        let (journal, untraced) = (&mut self.journal, &mut self.untraced);
         let pool =
             worker::WorkerPool { folder: &self.folder, options: &self.options, helpers, stop };
         let played = pool.play(&missing, jobs.max(1), progress, &mut |result| {
@@ -230,12 +231,20 @@ impl Run {
             }
             journal.append(result)?;
             untraced.retain(|r| r.key != result.key);
-            results.retain(|r| r.key != result.key);
-            results.push(result.clone());
             Ok(())
         });
-        self.journal.compact(self.results.iter().chain(&self.untraced))?;
-        played
+        let is_read = self.read_results();
+        let is_finished = played?;
+        is_read.map(|()| is_finished)
+    }
+
+    /// Reads the results from the journal, and removes replaced ones from it.
+    fn read_results(&mut self) -> Result<()> {
+        let (results, _) = read_results(&self.folder.results(), &self.planned)?;
+        self.journal.compact(&results)?;
+        let untraced: BTreeSet<&RunKey> = self.untraced.iter().map(|r| &r.key).collect();
+        self.results = results.into_iter().filter(|r| !untraced.contains(&r.key)).collect();
+        Ok(())
     }
 }
 

@@ -103,11 +103,12 @@ fn objects_beyond_the_limits_of_the_partner_are_named() {
     let (trace, episode) = played("low_target/test/00", "none", 60);
     let player = ReplayPlayer::open(trace.as_bytes(), episode.as_bytes()).unwrap();
     let [low_m, high_m] = player.info().agents[0].reach_m;
-    let beyond = player.beyond_limits();
-    assert!(!beyond.is_empty(), "this task has low objects");
-    for object in beyond {
+    let objects = player.task_objects();
+    assert!(objects.iter().any(|object| !object.limits.is_empty()), "this task has low objects");
+    assert!(objects.iter().any(|object| object.limits.is_empty()));
+    for object in objects {
         let is_beyond_reach = object.top_m < low_m || object.top_m > high_m;
         let is_heavy = object.mass_kg > player.info().agents[0].strength_kg;
-        assert!(is_beyond_reach || is_heavy, "{object:?}");
+        assert_eq!(is_beyond_reach || is_heavy, !object.limits.is_empty(), "{object:?}");
     }
 }

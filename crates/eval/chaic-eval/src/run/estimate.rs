@@ -1,4 +1,4 @@
-//! Estimate of a run's remaining time from the times of finished episode runs.
+//! Unfinished episode runs, and an estimate of their time from the times of finished ones.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -6,9 +6,10 @@ use std::time::Duration;
 use chaic_core::TaskId;
 use chaic_env::RunKey;
 
-/// Times of finished episode runs.
+/// Times of finished episode runs, and the numbers of unfinished ones.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Estimate {
+    unfinished: BTreeMap<(TaskId, String), u32>,
     by_task_and_helper: BTreeMap<(TaskId, String), Times>,
     by_helper: BTreeMap<String, Times>,
     all: Times,
@@ -32,8 +33,25 @@ impl Times {
 }
 
 impl Estimate {
+    /// Returns an estimate for these episode runs, none of which is finished.
+    pub fn new<'a>(planned: impl Iterator<Item = &'a RunKey>) -> Estimate {
+        let mut estimate = Estimate::default();
+        for key in planned {
+            *estimate.unfinished.entry((key.task, key.helper.clone())).or_default() += 1;
+        }
+        estimate
+    }
+
+    /// Returns whether all episode runs are finished.
+    pub fn is_finished(&self) -> bool {
+        self.unfinished.values().all(|n| *n == 0)
+    }
+
     /// Adds the time of a finished episode run.
-    pub fn add(&mut self, key: &RunKey, time: Duration) {
+    pub fn finish(&mut self, key: &RunKey, time: Duration) {
+        if let Some(n) = self.unfinished.get_mut(&(key.task, key.helper.clone())) {
+            *n = n.saturating_sub(1);
+        }
         self.by_task_and_helper.entry((key.task, key.helper.clone())).or_default().add(time);
         self.by_helper.entry(key.helper.clone()).or_default().add(time);
         self.all.add(time);
@@ -43,20 +61,16 @@ impl Estimate {
     ///
     /// The estimate of an episode run is the mean time of its task and helper, otherwise of its
     /// helper, otherwise of all.
-    pub fn remaining<'a>(
-        &self,
-        unfinished: impl Iterator<Item = &'a RunKey>,
-        jobs: usize,
-    ) -> Option<Duration> {
+    pub fn remaining(&self, jobs: usize) -> Option<Duration> {
         let all = self.all.mean()?;
-        let one = |key: &RunKey| {
-            let specific = self.by_task_and_helper.get(&(key.task, key.helper.clone()));
-            let known = specific.or_else(|| self.by_helper.get(&key.helper));
-            known.and_then(Times::mean).unwrap_or(all)
-        };
-        let (sum, longest) = unfinished
-            .map(one)
-            .fold((Duration::ZERO, Duration::ZERO), |(sum, max), t| (sum + t, max.max(t)));
+        let (mut sum, mut longest) = (Duration::ZERO, Duration::ZERO);
+        for (group, n) in self.unfinished.iter().filter(|(_, n)| **n > 0) {
+            let known =
+                self.by_task_and_helper.get(group).or_else(|| self.by_helper.get(&group.1));
+            let one = known.and_then(Times::mean).unwrap_or(all);
+            sum += one * *n;
+            longest = longest.max(one);
+        }
         Some((sum / jobs.max(1) as u32).max(longest))
     }
 }
@@ -74,14 +88,18 @@ mod tests {
             seed: 0,
         };
         let (a, b) = (TaskId::Obstacle, TaskId::Shopping);
-        let mut estimate = Estimate::default();
-        assert_eq!(estimate.remaining([key(a, "rhp")].iter(), 1), None);
-        estimate.add(&key(a, "rhp"), Duration::from_secs(10));
-        estimate.add(&key(b, "none"), Duration::from_secs(2));
-        let secs =
-            |keys: &[RunKey], jobs| estimate.remaining(keys.iter(), jobs).unwrap().as_secs_f64();
+        let first = [key(a, "rhp"), key(b, "none")];
+        assert_eq!(Estimate::new(first.iter()).remaining(1), None);
+        let secs = |unfinished: &[RunKey], jobs| {
+            let mut estimate = Estimate::new(first.iter().chain(unfinished));
+            estimate.finish(&first[0], Duration::from_secs(10));
+            estimate.finish(&first[1], Duration::from_secs(2));
+            assert_eq!(estimate.is_finished(), unfinished.is_empty());
+            estimate.remaining(jobs).unwrap().as_secs_f64()
+        };
         assert_eq!(secs(&[key(a, "rhp"), key(b, "none")], 1), 12.0);
         assert_eq!(secs(&[key(b, "rhp"), key(a, "none"), key(a, "random")], 1), 10.0 + 2.0 + 6.0);
         assert_eq!(secs(&[key(a, "rhp"), key(b, "none")], 2), 10.0, "at least the longest");
+        assert_eq!(secs(&[], 1), 0.0);
     }
 }

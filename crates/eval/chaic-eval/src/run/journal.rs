@@ -76,14 +76,11 @@ impl Journal {
     ///
     /// # Errors
     /// If an I/O operation fails. The journal is then unchanged.
-    pub(crate) fn compact<'r>(
-        &mut self,
-        results: impl Iterator<Item = &'r RunResult>,
-    ) -> Result<()> {
+    pub(crate) fn compact(&mut self, results: &[RunResult]) -> Result<()> {
         if !self.has_duplicates {
             return Ok(());
         }
-        let lines: String = results.map(|result| to_line(result) + "\n").collect();
+        let lines: String = results.iter().map(|result| to_line(result) + "\n").collect();
         write_atomically(&self.path, lines.as_bytes())?;
         self.file = open_for_append(&self.path)?;
         self.has_duplicates = false;

@@ -1,7 +1,6 @@
 //! Worker threads that play episode runs.
 
 use std::any::Any;
-use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Sender, channel};
@@ -93,8 +92,7 @@ impl WorkerPool<'_> {
         // Set after a failure; workers then stop.
         let failed = AtomicBool::new(false);
         let mut outcome = Ok(());
-        let mut unfinished: BTreeSet<&RunKey> = planned.iter().map(|job| &job.key).collect();
-        let mut estimate = Estimate::default();
+        let mut estimate = Estimate::new(planned.iter().map(|job| &job.key));
         std::thread::scope(|scope| {
             let (sender, receiver) = channel();
             for worker in 0..n_workers + n_waiting {
@@ -121,10 +119,8 @@ impl WorkerPool<'_> {
                         Ok(())
                     }
                     WorkerMessage::Finished { worker, result, time } => store(&result).map(|()| {
-                        estimate.add(&result.key, time);
-                        unfinished.remove(&result.key);
-                        let remaining =
-                            estimate.remaining(unfinished.iter().copied(), n_workers + n_waiting);
+                        estimate.finish(&result.key, time);
+                        let remaining = estimate.remaining(n_workers + n_waiting);
                         progress(&JobEvent::Finished(FinishedJob {
                             worker,
                             result,
@@ -142,7 +138,7 @@ impl WorkerPool<'_> {
                 }
             }
         });
-        outcome.map(|()| unfinished.is_empty())
+        outcome.map(|()| estimate.is_finished())
     }
 
     fn is_stopped(&self) -> bool {

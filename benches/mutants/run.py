@@ -20,6 +20,7 @@ Needs cargo-mutants (cargo install cargo-mutants --locked). All mutants take day
 """
 
 import argparse
+import filecmp
 import math
 import os
 import shutil
@@ -39,22 +40,26 @@ class Area:
 
     files: tuple[str, ...]
     packages: tuple[str, ...]
+    cargo_arguments: tuple[str, ...] = ()
     test_arguments: tuple[str, ...] = ()
 
 
 # The integration tests of chaic-eval concern helpers. Tests of interruptions take most of the time of the others.
-EVAL_TESTS = ("--lib", "--", "--skip", "merging", "--skip", "starting")
+UNIT_TESTS = ("--lib",)
+WITHOUT_INTERRUPTIONS = ("--", "--skip", "merging", "--skip", "starting")
 AREAS = {
     "world": Area(("crates/sim/chaic-world/src/**",), ("chaic-world", "chaic-reference")),
     "metrics": Area(
         ("crates/eval/chaic-eval/src/metrics/**",),
         ("chaic-eval",),
-        (*EVAL_TESTS, "--skip", "forging"),
+        UNIT_TESTS,
+        (*WITHOUT_INTERRUPTIONS, "--skip", "forging"),
     ),
     "verify": Area(
         ("crates/eval/chaic-eval/src/verify.rs", "crates/eval/chaic-eval/src/verify/**"),
         ("chaic-eval",),
-        EVAL_TESTS,
+        UNIT_TESTS,
+        WITHOUT_INTERRUPTIONS,
     ),
     "grants": Area(
         ("crates/agents/chaic-env/src/observer.rs", "crates/agents/chaic-env/src/track.rs"),
@@ -72,14 +77,19 @@ def arguments():
 
 
 def copy_checkout(to):
-    """Copies the committed and changed files of the checkout."""
+    """Makes a folder equal to the committed and changed files of the checkout, for cargo as new as needed."""
     listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
-    names = subprocess.run(listed, cwd=ROOT, check=True, capture_output=True).stdout
-    shutil.rmtree(to, ignore_errors=True)
-    for name in filter(None, names.decode().split("\0")):
-        if (ROOT / name).is_file():
-            (to / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(ROOT / name, to / name)
+    names = subprocess.run(listed, cwd=ROOT, check=True, capture_output=True).stdout.decode().split("\0")
+    files = {name for name in filter(None, names) if (ROOT / name).is_file()}
+    for path in [path for path in to.rglob("*") if path.is_file()]:
+        if str(path.relative_to(to)) not in files:
+            path.unlink()
+    for name in files:
+        source, copy = ROOT / name, to / name
+        # An interrupted run leaves a changed file, which has to become new again.
+        if not copy.is_file() or not filecmp.cmp(source, copy, shallow=False):
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(source, copy)
 
 
 def test(name, area, options, checkout):
@@ -92,6 +102,7 @@ def test(name, area, options, checkout):
     command += ["--minimum-test-timeout", "300", "--timeout-multiplier", "8"]
     command += [word for pattern in area.files for word in ("--file", pattern)]
     command += [word for package in area.packages for word in ("--test-package", package)]
+    command += [word for argument in area.cargo_arguments for word in ("--cargo-arg", argument)]
     command += [word for argument in area.test_arguments for word in ("--cargo-test-arg", argument)]
     # Compiling takes most of the time.
     environment = {
@@ -129,6 +140,8 @@ def main():
         sys.exit("error: cargo-mutants is missing; cargo install cargo-mutants --locked")
     checkout = options.out / "checkout"
     copy_checkout(checkout)
+    # An interrupted compiler can leave damaged files.
+    shutil.rmtree(options.out / "target/debug/incremental", ignore_errors=True)
     names = options.areas or list(AREAS)
     report({name: test(name, AREAS[name], options, checkout) for name in names})
 

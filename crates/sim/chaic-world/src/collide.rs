@@ -246,6 +246,21 @@ mod tests {
     }
 
     #[test]
+    fn a_body_inside_a_turned_box_leaves_it_by_the_shortest_way() {
+        let turned = Block { yaw_rad: 0.6, ..block([0.0, 0.5, 0.0], [1.0, 0.5, 0.3]) };
+        let index = BlockIndex::new(vec![turned], Rect::new([-5.0, -5.0], [5.0, 5.0]));
+        let to_world = |x: f32, z: f32| {
+            to_xz(chaic_core::geom::rotate_yaw(Vec3::new(x, 0.0, z), turned.yaw_rad))
+        };
+        for (inside, outside) in [([0.3, 0.2], [0.3, 0.5]), ([0.3, -0.2], [0.3, -0.5])] {
+            let from = to_world(inside[0], inside[1]);
+            let at = index.slide(WALKER, from, from, &[], &[]);
+            let expected = to_world(outside[0], outside[1]);
+            assert!(at.distance(expected) < 2e-3, "{at} instead of {expected}");
+        }
+    }
+
+    #[test]
     fn low_obstacles_are_stepped_over() {
         let rug = BlockIndex::new(
             vec![block([0.0, 0.05, 0.0], [1.0, 0.05, 1.0])],

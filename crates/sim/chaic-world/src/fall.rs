@@ -222,6 +222,24 @@ mod tests {
     }
 
     #[test]
+    fn the_support_is_the_lowest_contact() {
+        // The apple leans against a block of half of its height, while it stands on the table, and the other
+        // way round.
+        for entities in [[20, 23], [23, 20]] {
+            let [below, beside] = entities.map(EntityId);
+            let leaned = Obstacle {
+                center: Vec3::new(0.145, 0.775, 0.0),
+                half: Vec3::new(0.05, 0.025, 0.1),
+                entity: beside,
+                ..table()
+            };
+            let obstacles = [leaned, Obstacle { entity: below, ..table() }];
+            let fall = fall_alone(apple_at(Vec3::new(0.047, 0.8, 0.0)), &obstacles);
+            assert_eq!(fall.on, Some(below));
+        }
+    }
+
+    #[test]
     fn a_drop_beside_a_table_lands_on_the_ground() {
         let fall = fall_alone(apple_at(Vec3::new(1.0, 0.95, 0.0)), &[table()]);
         let (end, _) = *fall.path.last().unwrap();

@@ -7,5 +7,6 @@ mod compat;
 mod determinism;
 mod granted;
 mod impairments;
+mod positions;
 mod random;
 mod watches;

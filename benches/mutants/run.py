@@ -48,7 +48,10 @@ class Area:
 UNIT_TESTS = ("--lib",)
 WITHOUT_INTERRUPTIONS = ("--", "--skip", "merging", "--skip", "starting")
 AREAS = {
-    "world": Area(("crates/sim/chaic-world/src/**",), ("chaic-world", "chaic-reference")),
+    "world": Area(
+        ("crates/sim/chaic-world/src/**",),
+        ("chaic-world", "chaic-reference", "chaic-goldens"),
+    ),
     "metrics": Area(
         ("crates/eval/chaic-eval/src/metrics/**",),
         ("chaic-eval",),

@@ -179,6 +179,8 @@ export class ChaicPlay extends LitElement {
     // A tab in the background gets no callbacks; the episode goes on where it was.
     const framesPerSecond = (this.game?.speed ?? 1) * (this.info?.frames_per_second ?? 0);
     this.elapsedFrames += (Math.min(time - this.lastTime, 250) / 1000) * framesPerSecond;
+    // The world stands while a picture takes longer than a second, for example without a connection to a server.
+    this.elapsedFrames = Math.min(this.elapsedFrames, Math.max(framesPerSecond, 1));
     this.lastTime = time;
     const isWaiting = this.shown?.status === "waiting" && !this.input && !this.game?.isLive;
     const frames = Math.floor(this.elapsedFrames);

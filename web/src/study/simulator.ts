@@ -6,8 +6,6 @@ import type { Answer, Participant } from "./server.js";
 
 /** Shortest time between two pictures, milliseconds. */
 const INTERVAL_MS = 70;
-/** Largest number of frames of a turn. */
-const MAX_FRAMES = 240;
 const LINE_END = 10;
 
 /** Decodes a picture. */
@@ -87,8 +85,7 @@ export class ServerSimulator implements Simulator {
     const wait = this.lastTime + INTERVAL_MS - performance.now();
     if (wait > 0) await new Promise((resolve) => setTimeout(resolve, wait));
     this.lastTime = performance.now();
-    const { viewPx: view_px, input } = request;
-    const frames = Math.min(request.frames, MAX_FRAMES);
+    const { frames, viewPx: view_px, input } = request;
     let answer = await this.request(`/turns/${this.next}`, JSON.stringify({ frames, view_px, input }));
     if (answer.status === 409) {
       // The server has started again, or another request was the last one. The person decides again.

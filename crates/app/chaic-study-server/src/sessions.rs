@@ -295,3 +295,25 @@ fn live_config(plan: &Plan, trial: Trial) -> LiveConfig {
         is_live: plan.study().play.world == WorldPace::GoesOn,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_number_of_open_episodes_is_bounded_and_idle_ones_make_room() {
+        let sessions = Sessions::default();
+        for n in 0..MAX_SESSIONS {
+            sessions.entry(&n.to_string(), 0, n as u64 / 2).expect("there is memory");
+        }
+        let now_secs = MAX_SESSIONS as u64 / 2;
+        assert!(matches!(sessions.entry("new", 0, now_secs), Err(Refusal::Busy)));
+        // A participant who plays the next episode has one episode still.
+        sessions.entry("0", 1, now_secs).expect("its own place");
+        assert!(sessions.find("0", 0).is_err() && sessions.find("0", 1).is_ok());
+        sessions.entry("new", 0, SESSION_IDLE_SECS).expect("the place of an idle participant");
+        assert!(sessions.find("1", 0).is_err() && sessions.find("9", 0).is_ok());
+        sessions.close("9");
+        assert!(sessions.find("9", 0).is_err());
+    }
+}

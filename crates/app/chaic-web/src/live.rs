@@ -287,7 +287,8 @@ impl LiveSession {
         trace: &Trace,
         is_done: impl Fn(&LiveSession) -> bool,
     ) -> Result<(), LiveError> {
-        let mut decisions = trace.decisions().filter(|d| d.agent == self.seat).peekable();
+        let seat = self.seat;
+        let mut decisions = trace.decisions().filter(|d| d.agent == seat).peekable();
         while self.status != LiveStatus::Ended && !is_done(self) {
             if self.run_frame()? != AdvanceOutcome::NeedsAction {
                 continue;

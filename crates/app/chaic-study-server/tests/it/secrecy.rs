@@ -15,13 +15,14 @@ const OBSERVED: [&str; 5] = ["plans", "hands", "failure", "caption", "events"];
 const PARTS: [&str; 9] =
     ["frame", "horizon", "status", "plans", "hands", "failure", "caption", "progress", "events"];
 
-/// Returns the page, with its compressed parts decompressed.
+/// Returns the page without its program, with its compressed parts decompressed.
 fn page(server: &Server) -> Vec<u8> {
     let host = server.address;
     let request = format!("GET / HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n");
     let page = server.raw(request.as_bytes()).expect("an answer");
-    let mut all = page.bytes;
-    for part in page.body.split("<script type=\"text/plain\" id=\"").skip(1) {
+    let (page, _) = page.body.split_once("<script>").expect("a program at the end");
+    let mut all = page.as_bytes().to_vec();
+    for part in page.split("<script type=\"text/plain\" id=\"").skip(1) {
         let (_, content) = part.split_once('>').expect("a tag");
         let (content, _) = content.split_once('<').expect("an end");
         if let Ok(bytes) = STANDARD.decode(content) {

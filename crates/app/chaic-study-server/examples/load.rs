@@ -44,8 +44,8 @@ helper = "rhp"
 const VIEW_PX: u32 = 512;
 /// Frames of simulated time per second.
 const FRAMES_PER_SECOND: f64 = 30.0;
-/// Largest number of frames of a turn.
-const MAX_FRAMES: f64 = 240.0;
+/// Largest number of frames of a turn: the page lets the world stand while a picture takes longer than a second.
+const MAX_FRAMES: f64 = FRAMES_PER_SECOND;
 
 /// Figures of one player.
 struct Player {

@@ -154,7 +154,9 @@ impl Sessions {
         let open = self.find(code, trial)?;
         let mut game = lock(&open.game);
         let game = game.as_mut().ok_or(Refusal::Closed)?;
-        if let Some(answer) = game.answer.as_ref().filter(|_| number.checked_add(1) == Some(game.next)) {
+        if let Some(answer) =
+            game.answer.as_ref().filter(|_| number.checked_add(1) == Some(game.next))
+        {
             return Ok(answer.clone());
         }
         let done = game.turn(store, code, trial, number, turn);

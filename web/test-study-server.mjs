@@ -15,7 +15,6 @@ import { chaic, findings, launch } from "./test-kit.mjs";
 
 const folder = mkdtempSync(join(tmpdir(), "chaic-study-server-"));
 const definition = join(folder, "study.toml");
-const data = join(folder, "data");
 
 const STUDY = `title = "Help without the goal"
 consent = "text.txt"
@@ -42,6 +41,7 @@ const probe = spawnSync(chaic, ["study", "serve", "absent.toml", "--data", "abse
 const skip = probe.stderr.includes("no study server") ? "this build of chaic has no study server" : false;
 
 let browser;
+const servers = [];
 
 before(async () => {
   writeFileSync(join(folder, "text.txt"), "Plain words.\n");
@@ -50,14 +50,16 @@ before(async () => {
 });
 
 after(async () => {
+  for (const server of servers) server.kill();
   await browser?.close();
   rmSync(folder, { recursive: true });
 });
 
 /** Starts the server and returns its process and address. */
-async function serve(listen = "127.0.0.1:0") {
+async function serve(data, listen = "127.0.0.1:0") {
   const command = ["study", "serve", definition, "--data", data, "--listen", listen, "--format", "json"];
   const server = spawn(chaic, command, { stdio: ["ignore", "pipe", "inherit"] });
+  servers.push(server);
   let printed = "";
   for await (const text of server.stdout) {
     printed += text;
@@ -119,17 +121,18 @@ const isDrawn = (page) =>
     return new Set(new Uint32Array(data.buffer)).size > 1;
   });
 
-const files = () => (existsSync(data) ? readdirSync(data).filter((name) => name.endsWith(".jsonl")) : []);
+const files = (data) => (existsSync(data) ? readdirSync(data).filter((name) => name.endsWith(".jsonl")) : []);
 
 test("a participant plays by keyboard, reloads in the middle, and the export verifies", { skip }, async () => {
-  let { server, url } = await serve();
+  const data = join(folder, "played");
+  let { server, url } = await serve(data);
   const { page, context } = await open(url);
   // The page has neither the module nor an episode.
   const html = await (await page.request.get(url)).text();
   const encoded = /id="chaic-study">([^<]*)/.exec(html)[1];
   const content = JSON.parse(inflateRawSync(Buffer.from(encoded, "base64")).toString());
   assert.deepEqual(content.episodes, []);
-  assert.ok(!html.includes("chaic-module") && !html.includes("low_target"));
+  assert.ok(!html.includes('id="chaic-module"') && !html.includes("low_target"));
   await tabTo(page, /^I agree/);
   await heading(page, "Instructions");
   const code = await page.locator("b.code").innerText();
@@ -158,7 +161,7 @@ test("a participant plays by keyboard, reloads in the middle, and the export ver
   await playTo(page, reached + 90);
   assert.equal(await end(server), 0);
   await page.getByText("The episode goes on when it is back").waitFor();
-  ({ server } = await serve(new URL(url).host));
+  ({ server } = await serve(data, new URL(url).host));
   await page.getByText("The episode goes on when it is back").waitFor({ state: "hidden", timeout: 60_000 });
   await playTo(page, reached + 150);
   await tabTo(page, /^Stop here/);
@@ -196,17 +199,18 @@ test("a participant plays by keyboard, reloads in the middle, and the export ver
 });
 
 test("stopping in an episode deletes all data on the server", { skip }, async () => {
-  const { server, url } = await serve();
+  const data = join(folder, "stopped");
+  const { server, url } = await serve(data);
   const { page, context } = await open(url);
   await page.getByRole("button", { name: "I agree" }).click();
   await page.getByRole("button", { name: "Continue" }).click();
   await page.getByRole("button", { name: "Start the episode" }).click();
   await playTo(page, 30);
-  assert.equal(files().length, 1);
+  assert.equal(files(data).length, 1);
   await page.getByRole("button", { name: "Stop and delete" }).click();
   await page.getByRole("button", { name: "Delete and stop" }).click();
   await page.getByText(/^All your data in this browser and on the server/).waitFor();
-  assert.deepEqual(files(), []);
+  assert.deepEqual(files(data), []);
   assert.equal(await page.evaluate(async () => (await indexedDB.databases()).length), 0);
   await context.close();
   assert.equal(await end(server), 0);

@@ -234,4 +234,12 @@ export type Response =
   | { type: "live"; state: LiveState; view: Picture }
   | { type: "trace"; trace: string }
   | { type: "reference"; helper: string; rate: number }
+  /** The episode has ended before this page was loaded; only from a server. */
+  | { type: "over" }
   | { type: "error"; message: string };
+
+/** Where an episode is simulated: a worker or a server. Responses arrive in the order of the requests. */
+export interface Simulator {
+  post(request: Request): void;
+  close(): void;
+}

@@ -3,7 +3,17 @@
 import { html, LitElement, nothing, type PropertyValues, type TemplateResult } from "lit";
 import { property, query, state } from "lit/decorators.js";
 import { clock } from "./frames.js";
-import type { Action, Branch, LiveConfig, LiveInfo, LiveState, Request, Response, StoryLine } from "./messages.js";
+import type {
+  Action,
+  Branch,
+  LiveConfig,
+  LiveInfo,
+  LiveState,
+  Request,
+  Response,
+  Simulator,
+  StoryLine,
+} from "./messages.js";
 import { drawnSize, MAX_PX, paint } from "./pictures.js";
 import { SCAN_MS } from "./study/scanner.js";
 import { styles } from "./styles.js";
@@ -17,7 +27,9 @@ const RECORD_FRAMES = 15;
 
 /** What is played. */
 export interface Game {
+  /** Empty if a server simulates. */
   module: ArrayBuffer;
+  /** Empty if a server simulates. */
   episode: Uint8Array;
   config: LiveConfig;
   /** True if the world goes on while the person thinks; otherwise it waits. */
@@ -28,6 +40,8 @@ export interface Game {
   branch?: Branch;
   /** True in a study: the trace is passed on while it grows, and no results of others are shown. */
   isStudy?: boolean;
+  /** Starts the simulator of a server, which stores the trace; otherwise a worker simulates. */
+  startSimulator?: (receive: (response: Response) => void) => Simulator;
 }
 
 /** Result of a finished episode, for the page around it. */
@@ -61,7 +75,7 @@ export class ChaicPlay extends LitElement {
 
   @query("canvas") private canvas?: HTMLCanvasElement;
 
-  private worker?: Worker;
+  private simulator?: Simulator;
   private isBusy = false;
   /** True after the end of the episode, or after the person has stopped. */
   @state() private isOver = false;
@@ -85,8 +99,8 @@ export class ChaicPlay extends LitElement {
   }
 
   private close(): void {
-    this.worker?.terminate();
-    this.worker = undefined;
+    this.simulator?.close();
+    this.simulator = undefined;
     clearInterval(this.scanTimer);
     this.info = this.shown = this.problem = undefined;
     this.isScanning = false;
@@ -98,18 +112,24 @@ export class ChaicPlay extends LitElement {
 
   private open(game: Game): void {
     this.close();
-    const url = URL.createObjectURL(new Blob([this.workerSource], { type: "text/javascript" }));
-    this.worker = new Worker(url);
-    URL.revokeObjectURL(url);
-    this.worker.onmessage = (event: MessageEvent<Response>) => this.receive(event.data);
-    this.worker.onerror = (event) => this.fail(event.message || "the worker has stopped");
+    const receive = (response: Response): void => this.receive(response);
+    this.simulator = game.startSimulator?.(receive) ?? this.startWorker(receive);
     const { module, episode, config, branch } = game;
     this.post({ type: "play", module, episode, config: { ...config, is_live: game.isLive }, branch });
   }
 
+  private startWorker(receive: (response: Response) => void): Simulator {
+    const url = URL.createObjectURL(new Blob([this.workerSource], { type: "text/javascript" }));
+    const worker = new Worker(url);
+    URL.revokeObjectURL(url);
+    worker.onmessage = (event: MessageEvent<Response>) => receive(event.data);
+    worker.onerror = (event) => this.fail(event.message || "the worker has stopped");
+    return { post: (request) => worker.postMessage(request), close: () => worker.terminate() };
+  }
+
   private post(request: Request): void {
     this.isBusy = true;
-    this.worker?.postMessage(request);
+    this.simulator?.post(request);
   }
 
   private receive(response: Response): void {
@@ -132,6 +152,10 @@ export class ChaicPlay extends LitElement {
         this.references = new Map(this.references).set(response.helper, response.rate);
         this.compareNext();
         break;
+      case "over":
+        this.isOver = true;
+        this.dispatchEvent(new CustomEvent("over", { detail: "ended" }));
+        break;
       case "error":
         this.fail(response.message);
         break;
@@ -151,10 +175,12 @@ export class ChaicPlay extends LitElement {
   }
 
   private advance(time: number): void {
-    if (!this.worker || this.problem || this.isOver) return;
+    if (!this.simulator || this.problem || this.isOver) return;
     // A tab in the background gets no callbacks; the episode goes on where it was.
     const framesPerSecond = (this.game?.speed ?? 1) * (this.info?.frames_per_second ?? 0);
     this.elapsedFrames += (Math.min(time - this.lastTime, 250) / 1000) * framesPerSecond;
+    // The world stands while a picture takes longer than a second, for example without a connection to a server.
+    this.elapsedFrames = Math.min(this.elapsedFrames, Math.max(framesPerSecond, 1));
     this.lastTime = time;
     const isWaiting = this.shown?.status === "waiting" && !this.input && !this.game?.isLive;
     const frames = Math.floor(this.elapsedFrames);
@@ -284,7 +310,7 @@ export class ChaicPlay extends LitElement {
   override render(): TemplateResult {
     const { info, shown } = this;
     if (this.problem) return html`<p class="problem" role="alert">Cannot play: ${this.problem}</p>`;
-    if (!info) return html`<p role="status">Loading ...</p>`;
+    if (!info) return this.isOver ? html`` : html`<p role="status">Loading ...</p>`;
     return html`<section aria-label="Play" @keydown=${(event: KeyboardEvent) => this.press(event)}>
       ${this.heading(info)}
       <div class="columns">
@@ -317,7 +343,7 @@ export class ChaicPlay extends LitElement {
     return html`<header>
       <h2>${info.task}: you are the ${isHelper ? "helper" : "partner"}</h2>
       <p>${goal} You reach from ${low} to ${high} m and lift ${info.strength_kg.toFixed(0)} kg.</p>
-      <p class="small">${info.episode}. A simulation: real people differ from these bodies and views.</p>
+      <p class="small">${info.episode ? `${info.episode}. ` : ""}A simulation: real people differ from these bodies and views.</p>
     </header>`;
   }
 

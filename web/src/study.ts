@@ -1,11 +1,13 @@
-// Page of a study: consent, instructions, practice, blocks with forms, debriefing. Everything is in the page. The data
-// stay in the browser until the participant downloads them; the page of a server also sends them to it.
+// Page of a study: consent, instructions, practice, blocks with forms, debriefing. Everything is in the page, unless the
+// server simulates the episodes. The data stay in the browser until the participant downloads them; the page of a server
+// also sends them to it.
 
 import { html, LitElement, nothing, type TemplateResult } from "lit";
 import { query, state } from "lit/decorators.js";
 import { keyed } from "lit/directives/keyed.js";
 import { embedded, moduleBytes, workerSource } from "./embedded.js";
 import "./play.js";
+import type { Response, Simulator } from "./messages.js";
 import type { ChaicPlay, Game } from "./play.js";
 import {
   checkpoint,
@@ -22,6 +24,7 @@ import type { ChaicForm } from "./study/form.js";
 import { lock, StudyLog, type Identity } from "./study/log.js";
 import { Scanner } from "./study/scanner.js";
 import { drawToken, Participant, Upload } from "./study/server.js";
+import { ServerSimulator } from "./study/simulator.js";
 import { paragraphs } from "./study/text.js";
 
 /** Letters and digits of participant codes: those that are not mistaken for each other. */
@@ -61,6 +64,9 @@ export class ChaicStudy extends LitElement {
   /** Log of a participant who has agreed and whom the server may not know yet. */
   private entering?: { log: StudyLog; participant: Participant };
   private upload?: Upload;
+  private participant?: Participant;
+  /** True while an episode waits for the connection to the server. */
+  @state() private isConnectionLost = false;
   private readonly scanner = new Scanner(() => this.choices());
 
   protected override createRenderRoot(): HTMLElement {
@@ -132,8 +138,13 @@ export class ChaicStudy extends LitElement {
       }
       this.requestUpdate();
     };
-    this.upload = new Upload(participant, log, stored, changed);
+    this.participant = participant;
+    this.upload = new Upload(participant, log, stored, this.isSimulatedByServer(), changed);
     void this.upload.send();
+  }
+
+  private isSimulatedByServer(): boolean {
+    return this.content?.play.simulator === "server";
   }
 
   /** Appends a record to the log, and sends it to the server if there is one. */
@@ -142,12 +153,12 @@ export class ChaicStudy extends LitElement {
     void this.upload?.send();
   }
 
-  /** Goes on at the checkpoint. An episode that was running counts as left. */
+  /** Goes on at the checkpoint. An episode that was running goes on if the server has it, and counts as left otherwise. */
   private async resume(log: StudyLog): Promise<void> {
     this.log = log;
     this.isResumed = true;
     const trial = openTrial(log.records);
-    if (trial !== undefined) await this.store({ type: "trial_end", trial, outcome: "left" });
+    if (trial !== undefined && !this.isSimulatedByServer()) await this.store({ type: "trial_end", trial, outcome: "left" });
     this.at = checkpoint(this.steps, log.records);
   }
 
@@ -260,19 +271,35 @@ export class ChaicStudy extends LitElement {
   private async startTrial(step: Extract<Step, { kind: "trial" }>): Promise<void> {
     const { content, log } = this;
     if (!content || !log) return;
-    this.module ??= await moduleBytes();
+    const isSimulatedByServer = this.isSimulatedByServer();
+    if (!isSimulatedByServer) this.module ??= await moduleBytes();
     const [, condition, episode, helper] = step.trial;
     const { seat, input } = content.conditions[condition]!;
-    await this.store({ type: "trial", trial: step.number });
+    const isOpen = openTrial(log.records) === step.number;
+    if (!isOpen) await this.store({ type: "trial", trial: step.number });
     this.game = {
-      module: this.module,
-      episode: new TextEncoder().encode(content.episodes[episode]!),
-      config: { seed: content.seed, seat: seat === "partner" ? 0 : 1, level: input, helper },
+      module: this.module ?? new ArrayBuffer(0),
+      episode: new TextEncoder().encode(content.episodes[episode ?? -1] ?? ""),
+      config: { seed: content.seed, seat: seat === "partner" ? 0 : 1, level: input, helper: helper ?? "none" },
       isLive: content.play.world === "goes_on",
       speed: content.play.speed,
       isStudy: true,
+      startSimulator: isSimulatedByServer ? (receive) => this.startSimulator(step.number, receive) : undefined,
     };
     this.playing = "running";
+  }
+
+  /** Starts the simulator on the server. It waits until the server knows that the episode has begun. */
+  private startSimulator(trial: number, receive: (response: Response) => void): Simulator {
+    const changed = (isLost: boolean): void => {
+      this.isConnectionLost = isLost;
+    };
+    const simulator = new ServerSimulator(this.participant!, trial, receive, changed);
+    const sent = this.upload!.sent();
+    return {
+      post: (request) => void sent.then(() => simulator.post(request)),
+      close: () => simulator.close(),
+    };
   }
 
   private endTrial(trial: number, outcome: TrialOutcome): void {
@@ -282,9 +309,12 @@ export class ChaicStudy extends LitElement {
     });
   }
 
-  private download(): void {
+  /** Saves the data. Those with traces are on the server if it simulates. */
+  private async download(): Promise<void> {
+    const file = this.isSimulatedByServer() ? await this.participant?.data() : this.log?.toText();
+    if (file === undefined) return;
     const link = document.createElement("a");
-    link.href = URL.createObjectURL(new Blob([this.log?.toText() ?? ""], { type: "application/jsonl" }));
+    link.href = URL.createObjectURL(new Blob([file], { type: "application/jsonl" }));
     link.download = `${this.code()}.jsonl`;
     link.click();
     URL.revokeObjectURL(link.href);
@@ -319,15 +349,20 @@ export class ChaicStudy extends LitElement {
           ? html`<p class="problem" role="alert">The study cannot go on: ${this.problem}</p>`
           : nothing}
         <p class="small" role="status">${progress}</p>
-        <p class="small" role="status">
-          ${this.upload?.state === "waiting" && !this.hasLeft
-            ? "There is no connection to the server. Go on: your data are kept in this browser and sent later."
-            : nothing}
-        </p>
+        <p class="small" role="status">${this.connection()}</p>
         ${this.current()}
       </section>
       ${this.question()}
     </div>`;
+  }
+
+  /** Says that the connection to the server is lost, and what the participant can do. */
+  private connection(): string {
+    const isPlaying = this.playing === "running" && this.isSimulatedByServer();
+    if (this.hasLeft || !(this.upload?.state === "waiting" || (isPlaying && this.isConnectionLost))) return "";
+    return isPlaying
+      ? "There is no connection to the server. The episode goes on when it is back."
+      : "There is no connection to the server. Go on: your data are kept in this browser and sent later.";
   }
 
   private bar(): TemplateResult {
@@ -434,16 +469,23 @@ export class ChaicStudy extends LitElement {
   private trial(step: Extract<Step, { kind: "trial" }>): TemplateResult {
     const trials = this.steps.filter((other) => other.kind === "trial");
     const isPractice = step.trial[0] === 0;
+    const isOpen = openTrial(this.log?.records ?? []) === step.number;
+    const notRepeated = this.isSimulatedByServer() ? "" : "An episode that was interrupted is not repeated.";
+    const resumed = isOpen ? "The episode goes on where you were." : notRepeated;
     const title = `Episode ${step.number + 1} of ${trials.length}${isPractice ? ", practice" : ""}`;
     if (this.playing === "before") {
       return html`${this.heading(title)}
-        ${this.isResumed ? html`<p>The study goes on here. An episode that was interrupted is not repeated.</p>` : nothing}
+        ${this.isResumed ? html`<p>The study goes on here. ${resumed}</p>` : nothing}
         <p>${isPractice ? "This episode is for practice." : "This episode counts."}</p>
-        <p><button type="button" @click=${() => void this.startTrial(step)}>Start the episode</button></p>`;
+        <p>
+          <button type="button" @click=${() => void this.startTrial(step)}>
+            ${isOpen ? "Go on with the episode" : "Start the episode"}
+          </button>
+        </p>`;
     }
     return html`${this.heading(title)}
       <chaic-play
-        .workerSource=${workerSource()}
+        .workerSource=${this.isSimulatedByServer() ? "" : workerSource()}
         .game=${this.game}
         @recorded=${(event: CustomEvent<string>) =>
           void this.store({ type: "trace", trial: step.number, text: event.detail })}
@@ -473,7 +515,7 @@ export class ChaicStudy extends LitElement {
       <p>Completion code: <b class="code">${content.completion_code}</b></p>
       <p>Your code: <b class="code">${this.code()}</b>. With it, the researchers can delete your data.</p>
       <p>
-        <button type="button" @click=${() => this.download()}>Download your data</button>
+        <button type="button" @click=${() => void this.download()}>Download your data</button>
       </p>
       <p class="small">The file has your answers and your decisions. It has no name, no address and no times of day.
         "Stop and delete" removes ${content.server ? "all your data, also on the server" : "the copy in this browser"}.</p>

@@ -26,8 +26,9 @@ export interface Condition {
   input: InputLevel;
 }
 
-/** Position of the condition (0 for practice), condition, episode, and name of the helper. */
-export type Trial = [position: number, condition: number, episode: number, helper: string];
+/** Position of the condition (0 for practice), condition, episode, and name of the helper. If the server simulates, the
+ * page has neither episode nor helper. */
+export type Trial = [position: number, condition: number, episode?: number, helper?: string];
 
 /** What the page of a study shows. */
 export interface StudyContent {
@@ -40,7 +41,7 @@ export interface StudyContent {
   instructions: string;
   debrief: string;
   completion_code: string;
-  play: { world: "waits" | "goes_on"; speed: number };
+  play: { world: "waits" | "goes_on"; speed: number; simulator?: "server" };
   forms: Record<string, Form>;
   after_condition: string[];
   at_end: string[];
@@ -50,7 +51,7 @@ export interface StudyContent {
   server?: boolean;
   /** Trials of each slot. */
   slots: Trial[][];
-  /** Episodes (JSON). */
+  /** Episodes (JSON); none if the server simulates. */
   episodes: string[];
 }
 

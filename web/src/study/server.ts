@@ -1,6 +1,7 @@
 // Requests to the server of a study (crates/app/chaic-study-server/src/routes.rs), and the upload of a log.
 // All requests can be repeated, so a lost answer loses nothing.
 
+import type { LiveInfo } from "../messages.js";
 import type { DataRecord } from "./content.js";
 import type { Identity, StudyLog } from "./log.js";
 
@@ -20,12 +21,19 @@ export function drawToken(): string {
   return Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
-interface Answer {
+/** Answer of the server. */
+export interface Answer {
   /** Status of HTTP; 0 if there was no answer. */
   status: number;
   start?: DataRecord;
   stored?: number;
   error?: string;
+  /** Facts about an episode that is open on the server. */
+  info?: LiveInfo;
+  /** Number of the next turn. */
+  next?: number;
+  /** Body that is no JSON. */
+  bytes?: Uint8Array<ArrayBuffer>;
 }
 
 /** Returns whether a repetition of the request can succeed. */
@@ -76,6 +84,13 @@ export class Participant {
     if (status !== 200 && status !== 404) throw new Error(error ?? `the server answers ${status}`);
   }
 
+  /** Returns the file on the server after the end of the study; undefined if there is no connection. */
+  async data(): Promise<Uint8Array<ArrayBuffer> | undefined> {
+    const { bytes, error } = await this.request("GET", "/data");
+    if (error !== undefined) throw new Error(error);
+    return bytes;
+  }
+
   /** Sends a request until it has an answer that does not ask for a repetition; status 0 after an abort. */
   async repeated(method: string, path: string, body?: string, onFailure?: () => void): Promise<Answer> {
     for (let number = 0; ; number++) {
@@ -97,6 +112,9 @@ export class Participant {
         keepalive: (body?.length ?? 0) < KEEPALIVE_LENGTH,
         signal: AbortSignal.any([this.aborted.signal, AbortSignal.timeout(TIMEOUT_MS)]),
       });
+      if (response.headers.get("Content-Type") === "application/octet-stream") {
+        return { status: response.status, bytes: new Uint8Array(await response.arrayBuffer()) };
+      }
       return { ...((await response.json()) as object), status: response.status };
     } catch {
       // No connection, a time-out, or an answer that is not from the server of the study.
@@ -114,12 +132,15 @@ export class Upload {
   /** Reason of a refusal. */
   problem = "";
   private isRunning = false;
+  private waiters: (() => void)[] = [];
 
   /** `stored` is the number of records on the server, if known. `onChange` is called when the state changes. */
   constructor(
     private readonly participant: Participant,
     private readonly log: StudyLog,
     private stored: number | undefined,
+    /** True if the server appends ends of episodes by itself. */
+    private readonly isServerWriting: boolean,
     private readonly onChange: () => void,
   ) {}
 
@@ -141,7 +162,8 @@ export class Upload {
           : await this.participant.repeated("PUT", `/records/${known}`, this.batch(known), () => this.set("waiting"));
       if (answer.status === 0) return;
       // The server names what it has also if records before the sent ones are missing.
-      if (answer.stored === undefined || answer.stored > this.log.records.length) {
+      const n = this.log.records.length + (this.isServerWriting ? 1 : 0);
+      if (answer.stored === undefined || answer.stored > n) {
         this.problem = answer.error ?? "the server has more data than this browser";
         this.set("refused");
         return;
@@ -150,6 +172,14 @@ export class Upload {
     }
     this.isRunning = false;
     this.set("saved");
+    for (const done of this.waiters.splice(0)) done();
+  }
+
+  /** Resolves when the server has all records that the browser has stored. */
+  async sent(): Promise<void> {
+    const done = new Promise<void>((resolve) => this.waiters.push(resolve));
+    await this.send();
+    await done;
   }
 
   private set(state: UploadState): void {

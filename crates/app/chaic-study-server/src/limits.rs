@@ -27,6 +27,21 @@ pub const PARTICIPANT_RATE: Rate = Rate { burst: 100, per_sec: 20 };
 /// New participants: a class that begins at once, then five a second.
 pub const ENTRY_RATE: Rate = Rate { burst: 200, per_sec: 5 };
 
+/// Maximum size of the body of a turn, bytes: a plan has less than 200 characters.
+pub const MAX_TURN_BYTES: usize = 4 << 10;
+/// Maximum number of frames of a turn: a second at the highest speed.
+pub const MAX_TURN_FRAMES: u32 = 240;
+/// Largest side of a picture, pixels, and step of sides. Helpers see pictures of the largest size.
+pub const VIEW_PX: [u32; 2] = [512, 64];
+/// Turns of one participant. The page asks for at most 15 pictures a second.
+pub const TURN_RATE: Rate = Rate { burst: 60, per_sec: 20 };
+/// Maximum number of episodes in memory: see the measured size of an episode in docs/studies.md.
+pub const MAX_SESSIONS: usize = 200;
+/// Time without a turn after which another participant gets the memory of an episode, seconds.
+pub const SESSION_IDLE_SECS: u64 = 300;
+/// Simulated time after which the trace of a running episode is stored, also without a decision, frames.
+pub const RECORD_FRAMES: u32 = 15;
+
 /// Limit of a rate.
 #[derive(Clone, Copy, Debug)]
 pub struct Rate {

@@ -9,14 +9,17 @@ use std::path::{Path, PathBuf};
 use chaic_files::{
     EntryKind, FileError, kind, open_for_append, read_bounded, remove_file, write_new_private,
 };
-use chaic_study::data::DataRecord;
-use chaic_study::{ParticipantData, Plan, RecordCheck};
+use chaic_study::data::{DataRecord, TrialEnd};
+use chaic_study::{ParticipantData, Plan, RecordCheck, Simulator, Trial};
 
 use crate::access::TokenDigest;
 use crate::error::{Result, ServerError};
 use crate::limits::{MAX_FILE_BYTES, MAX_RECORDS, PARTICIPANT_RATE};
 use crate::refusal::Refusal;
 use crate::token_bucket::TokenBucket;
+
+/// Begin of a line of a trace, as [`DataRecord::to_line`] and pages write it.
+const TRACE_BEGIN: &str = "{\"type\":\"trace\",";
 
 /// Ending of files with the digest of a token. An export does not read them.
 const TOKEN_ENDING: &str = "token";
@@ -31,6 +34,8 @@ pub struct Log {
     path: PathBuf,
     check: RecordCheck,
     n_records: usize,
+    /// Number of records that the page has too: without traces if the server writes them.
+    n_page_records: usize,
     n_bytes: usize,
     /// True after a failed write, which may have left bytes behind.
     is_torn: bool,
@@ -55,7 +60,8 @@ impl Log {
             return Err(error.into());
         }
         let bucket = TokenBucket::new(PARTICIPANT_RATE, now_secs);
-        Ok(Log { path, check, n_records: 1, n_bytes: start.len(), is_torn: false, bucket })
+        let (n_records, n_page_records, n_bytes) = (1, 1, start.len());
+        Ok(Log { path, check, n_records, n_page_records, n_bytes, is_torn: false, bucket })
     }
 
     /// Reads the file of a participant, without an incomplete last line, and removes that line. Returns the slot
@@ -89,13 +95,38 @@ impl Log {
         }
         let bucket = TokenBucket::new(PARTICIPANT_RATE, now_secs);
         let n_records = data.records.len() + 1;
-        let log = Log { path: path.to_owned(), check, n_records, n_bytes, is_torn: false, bucket };
+        let text = String::from_utf8_lossy(&bytes);
+        let n_page_records = text.lines().filter(|line| is_of_page(plan, line)).count();
+        let path = path.to_owned();
+        let log = Log { path, check, n_records, n_page_records, n_bytes, is_torn: false, bucket };
         Ok((log, data.slot))
     }
 
-    /// Returns the number of stored records.
-    pub fn n_records(&self) -> usize {
-        self.n_records
+    /// Returns the number of stored records that the page has too.
+    pub fn n_page_records(&self) -> usize {
+        self.n_page_records
+    }
+
+    /// Returns whether a trial runs; `None` if it has not begun.
+    pub fn is_running(&self, trial: usize) -> Option<bool> {
+        self.check.is_running(trial)
+    }
+
+    /// Returns the trials of the participant.
+    pub fn trials(&self) -> &[Trial] {
+        self.check.trials()
+    }
+
+    /// Returns the stored trace of a trial.
+    pub fn trace(&self, wanted: usize) -> std::result::Result<String, Refusal> {
+        let text = self.read_stored()?;
+        let lines = text.lines().filter(|line| line.starts_with(TRACE_BEGIN));
+        let records = lines.filter_map(|line| DataRecord::parse(line).ok());
+        let texts = records.filter_map(|record| match record {
+            DataRecord::Trace { trial, text } if trial == wanted => Some(text),
+            _ => None,
+        });
+        Ok(texts.collect())
     }
 
     /// Returns whether the participant has finished.
@@ -114,15 +145,16 @@ impl Log {
         text.split_inclusive('\n').next().map(str::to_owned).ok_or(Refusal::Changed)
     }
 
-    /// Appends lines of records, the first of which has the number `from`, and compares those that are stored.
+    /// Appends lines of records of the page, the first of which has the number `from`, and compares those that
+    /// are stored. Numbers count the records that the page has.
     pub fn append(
         &mut self,
         plan: &Plan,
         from: usize,
         text: &str,
     ) -> std::result::Result<(), Refusal> {
-        if from > self.n_records {
-            return Err(Refusal::Gap { stored: self.n_records });
+        if from > self.n_page_records {
+            return Err(Refusal::Gap { stored: self.n_page_records });
         }
         let lines: Vec<&str> = text.split_inclusive('\n').collect();
         let wrong = |k: usize, problem: &str| Refusal::Record {
@@ -132,34 +164,68 @@ impl Log {
         if let Some(k) = lines.iter().position(|line| !line.ends_with('\n')) {
             return Err(wrong(k, "the line has no end"));
         }
-        let n_stored = (self.n_records - from).min(lines.len());
+        let n_stored = (self.n_page_records - from).min(lines.len());
         let (stored, new) = lines.split_at(n_stored);
         if !stored.is_empty() {
             let known = self.read_stored()?;
-            let known = known.split_inclusive('\n').skip(from);
+            let known =
+                known.split_inclusive('\n').filter(|line| is_of_page(plan, line)).skip(from);
             if let Some(k) = known.zip(stored).position(|(known, sent)| known != *sent) {
                 return Err(wrong(k, "another record is stored"));
             }
         }
-        if new.is_empty() {
+        let mut records = Vec::with_capacity(new.len());
+        for (k, line) in new.iter().enumerate() {
+            let record = DataRecord::parse(line).and_then(|record| from_page(plan, record));
+            records.push(record.map_err(|problem| wrong(n_stored + k, &problem))?);
+        }
+        self.add(plan, &records, new.concat(), |k, problem| wrong(n_stored + k, problem))?;
+        self.n_page_records += new.len();
+        Ok(())
+    }
+
+    /// Appends the next lines of the trace of a running trial, and its end if the episode has ended.
+    pub fn append_trace(
+        &mut self,
+        plan: &Plan,
+        trial: usize,
+        text: String,
+        has_ended: bool,
+    ) -> std::result::Result<(), Refusal> {
+        let end = DataRecord::TrialEnd { trial, outcome: TrialEnd::Ended };
+        let trace = (!text.is_empty()).then_some(DataRecord::Trace { trial, text });
+        let records: Vec<DataRecord> = trace.into_iter().chain(has_ended.then_some(end)).collect();
+        let lines = records.iter().map(DataRecord::to_line).collect();
+        self.add(plan, &records, lines, |_, _| Refusal::Over)?;
+        self.n_page_records += usize::from(has_ended);
+        Ok(())
+    }
+
+    /// Checks records and appends their lines.
+    fn add(
+        &mut self,
+        plan: &Plan,
+        records: &[DataRecord],
+        lines: String,
+        wrong: impl Fn(usize, &str) -> Refusal,
+    ) -> std::result::Result<(), Refusal> {
+        if records.is_empty() {
             return Ok(());
         }
-        if self.n_records + new.len() > MAX_RECORDS {
+        if self.n_records + records.len() > MAX_RECORDS {
             return Err(Refusal::Size(format!("{MAX_RECORDS} records")));
         }
-        let bytes = new.concat();
-        if self.n_bytes + bytes.len() > MAX_FILE_BYTES {
+        if self.n_bytes + lines.len() > MAX_FILE_BYTES {
             return Err(Refusal::Size(format!("{} MiB", MAX_FILE_BYTES >> 20)));
         }
         let mut check = self.check.clone();
-        for (k, line) in new.iter().enumerate() {
-            let record = DataRecord::parse(line).and_then(|record| check.add(plan, &record));
-            record.map_err(|problem| wrong(n_stored + k, &problem))?;
+        for (k, record) in records.iter().enumerate() {
+            check.add(plan, record).map_err(|problem| wrong(k, &problem))?;
         }
-        self.write(bytes.as_bytes())?;
+        self.write(lines.as_bytes())?;
         self.check = check;
-        self.n_records += new.len();
-        self.n_bytes += bytes.len();
+        self.n_records += records.len();
+        self.n_bytes += lines.len();
         Ok(())
     }
 
@@ -171,7 +237,7 @@ impl Log {
     }
 
     /// Reads the stored lines.
-    fn read_stored(&self) -> std::result::Result<String, Refusal> {
+    pub fn read_stored(&self) -> std::result::Result<String, Refusal> {
         self.check_present()?;
         let bytes = read_bounded(&self.path, self.n_bytes as u64)?;
         String::from_utf8(bytes).map_err(|_| Refusal::Changed)
@@ -209,6 +275,24 @@ impl Log {
         }
         Ok(written.map_err(FileError::context("write", &self.path))?)
     }
+}
+
+/// Returns whether a stored line is one that the page has too.
+fn is_of_page(plan: &Plan, line: &str) -> bool {
+    plan.study().play.simulator == Simulator::Page || !line.starts_with(TRACE_BEGIN)
+}
+
+/// Refuses records of a page that only the server writes.
+fn from_page(plan: &Plan, record: DataRecord) -> std::result::Result<DataRecord, String> {
+    let is_of_server = match record {
+        DataRecord::Trace { .. } => true,
+        DataRecord::TrialEnd { outcome, .. } => outcome == TrialEnd::Ended,
+        _ => false,
+    };
+    if is_of_server && plan.study().play.simulator == Simulator::Server {
+        return Err("the server of this study writes traces and ends of episodes".to_owned());
+    }
+    Ok(record)
 }
 
 fn remove_if_present(path: &Path) -> chaic_files::Result<()> {

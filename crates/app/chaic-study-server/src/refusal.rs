@@ -1,6 +1,7 @@
 //! Reasons why the server refuses a request of a participant.
 
 use chaic_files::FileError;
+use chaic_web::LiveError;
 
 /// Reason of a refusal. The text is for the participant.
 #[derive(Debug, thiserror::Error)]
@@ -34,6 +35,33 @@ pub enum Refusal {
     /// The participant has more data than the server takes.
     #[error("a participant has at most {0}")]
     Size(String),
+    /// The trial has not begun.
+    #[error("episode {0} has not begun")]
+    NotBegun(usize),
+    /// The trial has ended.
+    #[error("the episode is over")]
+    Over,
+    /// The server does not hold the episode, for example after a pause.
+    #[error("the episode is not open; open it again")]
+    Closed,
+    /// The turn is neither the next nor the last one.
+    #[error("the next turn of the episode is {next}")]
+    Turn {
+        /// Number of the next turn.
+        next: u64,
+    },
+    /// The content of a turn is invalid.
+    #[error("the turn is invalid: {0}")]
+    Input(String),
+    /// The file of a participant is sent after the end alone: traces contain the goals.
+    #[error("the data can be read at the end of the study")]
+    Unfinished,
+    /// Too many participants play at once.
+    #[error("too many episodes are played at once; repeat it later")]
+    Busy,
+    /// The simulator has a problem with the episode.
+    #[error("the episode cannot go on: {0}")]
+    Simulator(#[from] LiveError),
     /// The file of the participant was changed while the server ran.
     #[error("another program has changed the file of the participant")]
     Changed,

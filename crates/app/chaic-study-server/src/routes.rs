@@ -8,7 +8,8 @@
 //! | `DELETE /participants/CODE` | deletes the participant |
 //! | `PUT /participants/CODE/records/N` | appends records, the first of which has the number N |
 //!
-//! Requests for participants have a token. Every request can be repeated.
+//! Requests for participants have a token. Every request can be repeated. [`crate::play_routes`] has the routes of
+//! episodes, if the simulator runs on the server.
 
 use std::sync::Arc;
 
@@ -20,13 +21,14 @@ use axum::http::{HeaderMap, Method, StatusCode};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse as _, Response};
 use axum::routing::{get, put};
-use chaic_study::data::is_code;
+use chaic_study::data::{DataRecord, is_code};
 use serde_json::json;
 use tokio::task::spawn_blocking;
 use tokio::time::timeout;
 
 use crate::access::{AllowedHosts, TokenDigest};
 use crate::limits::{MAX_BODY_BYTES, REQUEST_TIMEOUT};
+use crate::play_routes::{self, Play};
 use crate::refusal::Refusal;
 use crate::store::{Entered, Store};
 
@@ -45,6 +47,8 @@ pub struct App {
     pub page: Bytes,
     /// Content security policy of the page.
     pub policy: HeaderValue,
+    /// Episodes, if the simulator runs on the server.
+    pub play: Option<Arc<Play>>,
     /// Clock.
     pub clock: Clock,
     /// Receiver of problems.
@@ -62,11 +66,13 @@ const HEADERS: [(HeaderName, &str); 5] = [
 
 /// Creates the routes.
 pub fn router(app: Arc<App>) -> Router {
+    let play = if app.play.is_some() { play_routes::router() } else { Router::new() };
     Router::new()
         .route("/", get(page))
         .route("/participants/{code}", put(enter).get(stored).delete(withdraw))
         .route("/participants/{code}/records/{from}", put(append))
-        .fallback(async || refuse(StatusCode::NOT_FOUND, "there is no such page"))
+        .merge(play)
+        .fallback(async || no_such_page())
         .method_not_allowed_fallback(async || {
             refuse(StatusCode::METHOD_NOT_ALLOWED, "the page has no such method")
         })
@@ -107,7 +113,11 @@ async fn enter(
     headers: HeaderMap,
 ) -> Response {
     respond(app, code, &headers, StatusCode::CREATED, |app, code, token| {
-        let Entered { start, stored } = app.store.enter(code, token, (app.clock)())?;
+        let Entered { start, slot, stored } = app.store.enter(code, token, (app.clock)())?;
+        let start = match &app.play {
+            Some(play) => DataRecord::start(&play.page_digest, code, slot).to_line(),
+            None => start,
+        };
         // The line as it is: a parsed one would lose the order of its keys.
         Ok(format!("{{\"start\":{},\"stored\":{stored}}}", start.trim_end()))
     })
@@ -132,6 +142,9 @@ async fn withdraw(
 ) -> Response {
     respond(app, code, &headers, StatusCode::OK, |app, code, token| {
         app.store.withdraw(code, token)?;
+        if let Some(play) = &app.play {
+            play.sessions.close(code);
+        }
         Ok(stored_json(0))
     })
     .await
@@ -145,7 +158,7 @@ async fn append(
     let (parts, body) = request.into_parts();
     let is_number = !from.is_empty() && from.bytes().all(|byte| byte.is_ascii_digit());
     let Some(from) = from.parse::<usize>().ok().filter(|_| is_number) else {
-        return refuse(StatusCode::NOT_FOUND, "there is no such page");
+        return no_such_page();
     };
     // The sender is known before the body is read.
     let token = TokenDigest::of_request(&parts.headers);
@@ -154,29 +167,33 @@ async fn append(
     {
         return refusal_response(&app, &refusal);
     }
-    let text = match read_text(body).await {
+    let text = match read_text(body, MAX_BODY_BYTES).await {
         Ok(text) => text,
         Err(response) => return response,
     };
     respond(app, code, &parts.headers, StatusCode::OK, move |app, code, token| {
-        Ok(stored_json(app.store.append(code, token, from, &text, (app.clock)())?))
+        let stored = app.store.append(code, token, from, &text, (app.clock)())?;
+        if let Some(play) = &app.play {
+            play.sessions.close_ended(&app.store, code);
+        }
+        Ok(stored_json(stored))
     })
     .await
 }
 
 /// Reads a body of limited size.
-async fn read_text(body: Body) -> Result<String, Response> {
+pub async fn read_text(body: Body, max_bytes: usize) -> Result<String, Response> {
     let refused = || {
-        let text = format!("the request is incomplete or longer than {MAX_BODY_BYTES} bytes");
+        let text = format!("the request is incomplete or longer than {max_bytes} bytes");
         refuse(StatusCode::PAYLOAD_TOO_LARGE, &text)
     };
     // A length in the headers is compared before anything is read.
-    if body.size_hint().lower() > MAX_BODY_BYTES as u64 {
+    if body.size_hint().lower() > max_bytes as u64 {
         return Err(refused());
     }
-    let bytes = to_bytes(body, MAX_BODY_BYTES).await.map_err(|_| refused())?;
+    let bytes = to_bytes(body, max_bytes).await.map_err(|_| refused())?;
     String::from_utf8(bytes.into())
-        .map_err(|_| refuse(StatusCode::UNPROCESSABLE_ENTITY, "the records are not UTF-8"))
+        .map_err(|_| refuse(StatusCode::UNPROCESSABLE_ENTITY, "the body is not UTF-8"))
 }
 
 /// Performs a request of a participant on a thread for files.
@@ -188,7 +205,7 @@ async fn respond(
     perform: impl FnOnce(&App, &str, &TokenDigest) -> Result<String, Refusal> + Send + 'static,
 ) -> Response {
     if !is_code(&code) {
-        return refuse(StatusCode::NOT_FOUND, "there is no such page");
+        return no_such_page();
     }
     let Some(token) = TokenDigest::of_request(headers) else {
         return refusal_response(&app, &Refusal::Token);
@@ -197,35 +214,53 @@ async fn respond(
     match spawn_blocking(move || perform(&shared, &code, &token)).await {
         Ok(Ok(answer)) => json_response(success, answer),
         Ok(Err(refusal)) => refusal_response(&app, &refusal),
-        Err(_) => {
-            (app.report)("a request of a participant has failed; this is an error of chaic");
-            refuse(StatusCode::INTERNAL_SERVER_ERROR, "the server has failed")
-        }
+        Err(_) => server_failure(&app),
     }
 }
 
+/// Answers after a panic.
+pub fn server_failure(app: &App) -> Response {
+    (app.report)("a request of a participant has failed; this is an error of chaic");
+    refuse(StatusCode::INTERNAL_SERVER_ERROR, "the server has failed")
+}
+
 /// Answers with a refusal, and reports those that the researcher can remedy.
-fn refusal_response(app: &App, refusal: &Refusal) -> Response {
+pub fn refusal_response(app: &App, refusal: &Refusal) -> Response {
     let status = match refusal {
         Refusal::Unknown => StatusCode::NOT_FOUND,
         Refusal::Token => StatusCode::UNAUTHORIZED,
-        Refusal::Full => StatusCode::GONE,
+        Refusal::Full | Refusal::Over => StatusCode::GONE,
         Refusal::Rate => StatusCode::TOO_MANY_REQUESTS,
-        Refusal::Gap { .. } => StatusCode::CONFLICT,
-        Refusal::Record { .. } => StatusCode::UNPROCESSABLE_ENTITY,
+        Refusal::Gap { .. } | Refusal::Turn { .. } | Refusal::Closed | Refusal::NotBegun(_) => {
+            StatusCode::CONFLICT
+        }
+        Refusal::Record { .. } | Refusal::Input(_) | Refusal::Simulator(_) => {
+            StatusCode::UNPROCESSABLE_ENTITY
+        }
+        Refusal::Unfinished => StatusCode::FORBIDDEN,
+        Refusal::Busy => StatusCode::SERVICE_UNAVAILABLE,
         Refusal::Size(_) => StatusCode::PAYLOAD_TOO_LARGE,
         Refusal::Changed | Refusal::File(_) => StatusCode::INTERNAL_SERVER_ERROR,
     };
     match refusal {
         Refusal::File(error) => (app.report)(&error.to_string()),
-        Refusal::Changed => (app.report)(&refusal.to_string()),
+        Refusal::Changed | Refusal::Simulator(_) | Refusal::Busy => {
+            (app.report)(&refusal.to_string());
+        }
         _ => {}
     }
     let mut answer = json!({ "error": refusal.to_string() });
-    if let Refusal::Gap { stored } = refusal {
-        answer["stored"] = json!(stored);
+    match refusal {
+        Refusal::Gap { stored } => answer["stored"] = json!(stored),
+        Refusal::Turn { next } => answer["next"] = json!(next),
+        _ => {}
     }
     json_response(status, answer.to_string())
+}
+
+/// Answers to a request for another path.
+pub fn no_such_page() -> Response {
+    refuse(StatusCode::NOT_FOUND, "there is no such page")
 }
 
 /// Answers with an error.
@@ -237,7 +272,7 @@ fn stored_json(stored: usize) -> String {
     json!({ "stored": stored }).to_string()
 }
 
-fn json_response(status: StatusCode, answer: String) -> Response {
+pub fn json_response(status: StatusCode, answer: String) -> Response {
     let media_type = HeaderValue::from_static("application/json");
     (status, [(header::CONTENT_TYPE, media_type)], answer).into_response()
 }

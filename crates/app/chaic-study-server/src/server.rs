@@ -11,8 +11,8 @@ use axum::Router;
 use axum::http::HeaderValue;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use chaic_page::{study_page, study_script};
-use chaic_study::{Plan, page_content};
+use chaic_page::{study_page, study_page_without_simulator, study_script};
+use chaic_study::{Plan, Simulator, page_content};
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::GracefulShutdown;
@@ -28,6 +28,7 @@ use crate::error::{Result, ServerError};
 use crate::limits::{
     HEADER_TIMEOUT, MAX_CONNECTIONS, MAX_HEADER_BYTES, STOP_TIMEOUT, WRITER_THREADS,
 };
+use crate::play_routes::Play;
 use crate::routes::{App, Clock, Reporter, router};
 use crate::store::{Counts, Store};
 
@@ -86,11 +87,19 @@ impl StudyServer {
         let address = listener.local_addr().map_err(refused)?;
         let mut content = page_content(&plan);
         content["server"] = json!(true);
-        let page = study_page(&plan.study().title, &content);
+        let title = &plan.study().title;
+        let is_simulated_here = plan.study().play.simulator == Simulator::Server;
+        let page_digest = content["digest"].as_str().unwrap_or_default().to_owned();
+        let (page, play) = if is_simulated_here {
+            let play = Arc::new(Play::new(page_digest));
+            (study_page_without_simulator(title, &content), Some(play))
+        } else {
+            (study_page(title, &content), None)
+        };
+        let policy = policy(is_simulated_here);
         let store = Store::open(plan, folder, clock())?;
         let hosts = AllowedHosts::new(address, hosts);
-        let app =
-            Arc::new(App { store, hosts, page: page.into(), policy: policy(), clock, report });
+        let app = Arc::new(App { store, hosts, page: page.into(), policy, play, clock, report });
         Ok(StudyServer { runtime, listener, address, app })
     }
 
@@ -167,11 +176,14 @@ async fn serve(listener: tokio::net::TcpListener, router: Router, stop: &AtomicB
     let _ = timeout(STOP_TIMEOUT, connections.shutdown()).await;
 }
 
-/// Returns the policy of the page: its own script, module and worker, and requests to this server alone.
-fn policy() -> HeaderValue {
+/// Returns the policy of the page: its own script, requests to this server alone, and, unless the simulator runs
+/// on the server, its module and worker.
+fn policy(is_simulated_here: bool) -> HeaderValue {
     let hash = STANDARD.encode(Sha256::digest(study_script()));
+    let simulator =
+        if is_simulated_here { "" } else { " 'wasm-unsafe-eval' blob:; worker-src blob:" };
     let text = format!(
-        "default-src 'none'; script-src 'sha256-{hash}' 'wasm-unsafe-eval' blob:; worker-src blob:; \
+        "default-src 'none'; script-src 'sha256-{hash}'{simulator}; \
          style-src 'unsafe-inline'; img-src data: blob:; connect-src 'self'; base-uri 'none'; \
          form-action 'none'; frame-ancestors 'none'"
     );

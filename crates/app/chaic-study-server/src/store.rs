@@ -10,7 +10,7 @@ use chaic_files::{
     remove_file,
 };
 use chaic_study::data::{DataRecord, is_code};
-use chaic_study::{Plan, RecordCheck, SlotHolder, lowest_free_slot};
+use chaic_study::{Plan, RecordCheck, SlotHolder, Trial, lowest_free_slot};
 
 use crate::access::TokenDigest;
 use crate::error::{Result, ServerError};
@@ -58,8 +58,19 @@ struct Participant {
 pub struct Entered {
     /// Line of the first record.
     pub start: String,
+    /// Slot.
+    pub slot: u32,
     /// Number of stored records.
     pub stored: usize,
+}
+
+/// Trial that a participant plays.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RunningTrial {
+    /// The trial.
+    pub trial: Trial,
+    /// Its stored trace.
+    pub trace: String,
 }
 
 /// Number of participants with files.
@@ -111,7 +122,8 @@ impl Store {
             let mut log = lock(&known.log);
             let log = log.as_mut().ok_or(Refusal::Unknown)?;
             log.take_token(now_secs)?;
-            return Ok(Entered { start: log.first_line()?, stored: log.n_records() });
+            let (start, slot) = (log.first_line()?, known.slot);
+            return Ok(Entered { start, slot, stored: log.n_page_records() });
         }
         if !participants.entry_bucket.take(now_secs) {
             return Err(Refusal::Rate);
@@ -134,7 +146,7 @@ impl Store {
         match Log::create(self.path(code), check, token, &start, now_secs) {
             Ok(created) => {
                 *log = Some(created);
-                Ok(Entered { start, stored: 1 })
+                Ok(Entered { start, slot, stored: 1 })
             }
             Err(refusal) => {
                 lock(&self.participants).by_code.remove(code);
@@ -157,7 +169,79 @@ impl Store {
         let mut log = lock(&participant.log);
         let log = log.as_mut().ok_or(Refusal::Unknown)?;
         log.take_token(now_secs)?;
-        Ok(log.n_records())
+        Ok(log.n_page_records())
+    }
+
+    /// Returns a running trial of a participant.
+    ///
+    /// # Errors
+    /// The [`Refusal`].
+    pub fn running_trial(
+        &self,
+        code: &str,
+        token: &TokenDigest,
+        number: usize,
+        now_secs: u64,
+    ) -> std::result::Result<RunningTrial, Refusal> {
+        let participant = self.find(code, token)?;
+        let mut log = lock(&participant.log);
+        let log = log.as_mut().ok_or(Refusal::Unknown)?;
+        log.take_token(now_secs)?;
+        match log.is_running(number) {
+            None => Err(Refusal::NotBegun(number)),
+            Some(false) => Err(Refusal::Over),
+            Some(true) => {
+                Ok(RunningTrial { trial: log.trials()[number], trace: log.trace(number)? })
+            }
+        }
+    }
+
+    /// Returns whether a trial of a participant runs.
+    pub fn is_running(&self, code: &str, number: usize) -> bool {
+        let found = lock(&self.participants).by_code.get(code).cloned();
+        found.is_some_and(|participant| {
+            lock(&participant.log).as_ref().and_then(|log| log.is_running(number)) == Some(true)
+        })
+    }
+
+    /// Appends the next lines of the trace of a running trial, and its end if the episode has ended.
+    ///
+    /// # Errors
+    /// The [`Refusal`]; nothing is stored then.
+    pub fn append_trace(
+        &self,
+        code: &str,
+        number: usize,
+        text: String,
+        has_ended: bool,
+    ) -> std::result::Result<(), Refusal> {
+        let found = lock(&self.participants).by_code.get(code).cloned();
+        let participant = found.ok_or(Refusal::Unknown)?;
+        let mut guard = lock(&participant.log);
+        let log = guard.as_mut().ok_or(Refusal::Unknown)?;
+        log.append_trace(&self.plan, number, text, has_ended)
+    }
+
+    /// Returns the file of a participant who has finished.
+    ///
+    /// # Errors
+    /// The [`Refusal`].
+    pub fn complete_data(
+        &self,
+        code: &str,
+        token: &TokenDigest,
+        now_secs: u64,
+    ) -> std::result::Result<String, Refusal> {
+        let participant = self.find(code, token)?;
+        let mut log = lock(&participant.log);
+        let log = log.as_mut().ok_or(Refusal::Unknown)?;
+        log.take_token(now_secs)?;
+        if log.is_complete() { log.read_stored() } else { Err(Refusal::Unfinished) }
+    }
+
+    /// Returns the plan of the study.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
     }
 
     /// Checks that a participant exists and has this token.
@@ -188,7 +272,7 @@ impl Store {
         match log.append(&self.plan, from, text) {
             Ok(()) => {
                 participant.is_complete.store(log.is_complete(), Ordering::Relaxed);
-                Ok(log.n_records())
+                Ok(log.n_page_records())
             }
             // Somebody has removed the file, for example by `chaic study delete`.
             Err(Refusal::Unknown) => {
@@ -311,6 +395,6 @@ fn remove_leftovers(folder: &Path, by_code: &BTreeMap<String, Arc<Participant>>)
 }
 
 /// Locks a mutex. A panic while it was held left a consistent state, since changes follow all checks.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -2,8 +2,9 @@
 //!
 //! **What it is**: the module that the pages of chaic load. A [`ReplayPlayer`] replays the whole trace
 //! once when it is opened, compares the digest of each decision with the recorded one, and then shows
-//! any frame. Partner and helper run again beside it, for drawings of what they know. A [`LiveSession`] runs an episode in which a person controls an agent, from the start or
-//! from a frame of a trace. `bindings` exports both to JavaScript.
+//! any frame. Partner and helper run again beside it, for drawings of what they know. A [`LiveSession`]
+//! runs an episode in which a person controls an agent, from the start or from a frame of a trace; the
+//! server of a study uses it too. `bindings` exports both to JavaScript.
 //!
 //! **What it is not**: it reads no files, uses no network and no threads, and contains no page; the
 //! elements of the page are in `web/`.
@@ -20,8 +21,8 @@ mod timeline;
 pub use drawing::DrawnImage;
 pub use limits::{Limit, TaskObject};
 pub use live::{
-    InputLevel, LiveConfig, LiveError, LiveInfo, LiveSession, LiveState, LiveStatus, PERSON,
-    reference,
+    InputLevel, LiveConfig, LiveError, LiveInfo, LiveInput, LiveSession, LiveState, LiveStatus,
+    PERSON, reference,
 };
 pub use memory_history::{MemoryState, PlacedObject, RerunInfo};
 pub use player::{DecisionLine, FrameState, PlayerError, ReplayInfo, ReplayPlayer, RerunState};

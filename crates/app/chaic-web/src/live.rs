@@ -78,6 +78,16 @@ pub struct LiveConfig {
     pub is_live: bool,
 }
 
+/// Decision of a person.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LiveInput {
+    /// Text of a plan, if the person chooses plans.
+    Plan(String),
+    /// Action, if the person chooses each action.
+    Action(Action),
+}
+
 /// Progress of the episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -242,22 +252,54 @@ impl LiveSession {
             ..EpisodeConfig::new(&episode, PERSON)
         };
         let mut session = LiveSession::with(base, &config)?;
-        let mut decisions = trace.decisions().filter(|d| d.agent == config.seat).peekable();
-        while session.env.world().state().frame < from && session.status != LiveStatus::Ended {
-            if session.run_frame()? != AdvanceOutcome::NeedsAction {
-                continue;
-            }
-            let frame = session.env.world().state().frame;
-            let next = decisions.next_if(|decision| decision.frame == frame);
-            let action = next.ok_or(LiveError::Diverged)?.action.map(Target::Entity);
-            session.observe();
-            session.submit(action);
-        }
+        session.repeat(&trace, |session| session.env.world().state().frame >= from)?;
         if digest_at(&trace, &episode, from)? != session.env.digest() {
             return Err(LiveError::Diverged);
         }
         session.branch_of = Some(BranchPoint { trace: Digest::of_bytes(bytes), frame: from });
         Ok(session)
+    }
+
+    /// Goes on with the trace (JSON lines) of a session with the same episode and configuration. The person of an
+    /// interrupted plan chooses again.
+    ///
+    /// # Errors
+    /// If trace or episode are unreadable, or the session does not repeat the trace.
+    pub fn resume(
+        bytes: &[u8],
+        episode: &[u8],
+        config: &LiveConfig,
+    ) -> Result<LiveSession, LiveError> {
+        let (trace, _) = chaic_env::trace::parse(bytes, "trace".as_ref())?;
+        let mut session = LiveSession::start(episode, config)?;
+        let n_lines = bytes.iter().filter(|byte| **byte == b'\n').count();
+        session.repeat(&trace, |session| session.n_lines() >= n_lines)?;
+        session.events.clear();
+        if !session.trace().as_bytes().starts_with(bytes) {
+            return Err(LiveError::Diverged);
+        }
+        Ok(session)
+    }
+
+    /// Repeats the decisions of the person in a trace until a condition holds or the episode ends.
+    fn repeat(
+        &mut self,
+        trace: &Trace,
+        is_done: impl Fn(&LiveSession) -> bool,
+    ) -> Result<(), LiveError> {
+        let seat = self.seat;
+        let mut decisions = trace.decisions().filter(|d| d.agent == seat).peekable();
+        while self.status != LiveStatus::Ended && !is_done(self) {
+            if self.run_frame()? != AdvanceOutcome::NeedsAction {
+                continue;
+            }
+            let frame = self.env.world().state().frame;
+            let next = decisions.next_if(|decision| decision.frame == frame);
+            let action = next.ok_or(LiveError::Diverged)?.action.map(Target::Entity);
+            self.observe();
+            self.submit(action);
+        }
+        Ok(())
     }
 
     /// Returns the facts that do not change. A person who helps does not learn the goal.
@@ -302,6 +344,24 @@ impl LiveSession {
             }
         }
         Ok(self.status)
+    }
+
+    /// Takes a decision. Returns false, without any change, if it cannot be taken now.
+    pub fn decide(&mut self, input: &LiveInput) -> bool {
+        match input {
+            LiveInput::Plan(plan) => self.choose_plan(plan),
+            LiveInput::Action(action) => self.act(*action),
+        }
+    }
+
+    /// Returns the progress of the episode.
+    pub fn status(&self) -> LiveStatus {
+        self.status
+    }
+
+    /// Returns the current frame.
+    pub fn frame(&self) -> Frame {
+        self.env.world().state().frame
     }
 
     /// Selects a plan by its text. Returns false if it cannot be started now: with a live clock, the
@@ -433,8 +493,24 @@ impl LiveSession {
         Caption::of_agent(self.env.world(), self.seat, PERSON, &thought)
     }
 
+    /// Returns the number of lines of the trace so far, with that of the header.
+    pub fn n_lines(&self) -> usize {
+        1 + self.lines.len()
+    }
+
     /// Returns the trace so far (JSON lines).
     pub fn trace(&self) -> String {
+        self.trace_after(0)
+    }
+
+    /// Returns the trace so far without its first `n_lines` lines.
+    pub fn trace_after(&self, n_lines: usize) -> String {
+        let header = (n_lines == 0).then(|| self.header_line());
+        let lines = self.lines.iter().skip(n_lines.saturating_sub(1)).cloned();
+        header.into_iter().chain(lines).map(|line| line + "\n").collect()
+    }
+
+    fn header_line(&self) -> String {
         let mut header = Header { branch_of: self.branch_of, ..self.env.header().clone() };
         let input = match self.level {
             InputLevel::Plans => "plans",
@@ -442,16 +518,19 @@ impl LiveSession {
         };
         let person = &mut header.people[self.seat.index()];
         (person.input, person.is_live) = (Some(input.to_owned()), self.is_live);
-        let lines = std::iter::once(header.to_line()).chain(self.lines.iter().cloned());
-        lines.map(|line| line + "\n").collect()
+        header.to_line()
     }
 
-    /// Draws what the person sees, as a square image.
+    /// Draws what the person sees, as a square image for a canvas.
     pub fn draw_view(&self, side_px: u32) -> DrawnImage {
+        DrawnImage::from_rgb(side_px, side_px, &self.draw_view_rgb(side_px))
+    }
+
+    /// Draws what the person sees: RGB, u8, shape `[side_px, side_px, 3]`, row 0 at the top.
+    pub fn draw_view_rgb(&self, side_px: u32) -> Vec<u8> {
         let view = View::from_agent(self.env.world(), self.seat, side_px, Channels::RGB);
         let images = self.scene.render(self.env.world(), &[view]);
-        let rgb = images.into_iter().next().and_then(|images| images.rgb).unwrap_or_default();
-        DrawnImage::from_rgb(side_px, side_px, &rgb)
+        images.into_iter().next().and_then(|images| images.rgb).unwrap_or_default()
     }
 }
 

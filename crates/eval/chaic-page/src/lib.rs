@@ -81,6 +81,13 @@ pub fn study_page(title: &str, content: &serde_json::Value) -> String {
     render_with(STUDY_SCRIPT, context! { title, study })
 }
 
+/// Returns the HTML page of a study with this content that runs no simulator: it gets all pictures from a server.
+pub fn study_page_without_simulator(title: &str, content: &serde_json::Value) -> String {
+    let study = encoded(content.to_string().as_bytes());
+    let script = inline(STUDY_SCRIPT);
+    render_values(context! { title, study, script, style => STYLE })
+}
+
 /// Returns the text of the script in the page of a study, for its content security policy.
 pub fn study_script() -> String {
     inline(STUDY_SCRIPT)
@@ -98,13 +105,18 @@ fn render(values: Value) -> String {
 
 /// Renders the template with these values, a script and the module.
 fn render_with(script: &str, values: Value) -> String {
+    let [worker, script] = [WORKER, script].map(inline);
+    let fixed = context! { worker, script, style => STYLE, module => STANDARD.encode(MODULE) };
+    render_values(context! { ..values, ..fixed })
+}
+
+/// Renders the template with these values.
+fn render_values(values: Value) -> String {
     let mut environment = Environment::new();
     let (name, source) = TEMPLATE;
     environment.add_template(name, source).expect("the template is valid");
-    let [worker, script] = [WORKER, script].map(inline);
-    let fixed = context! { worker, script, style => STYLE, module => STANDARD.encode(MODULE) };
     let template = environment.get_template(name).expect("it was added above");
-    template.render(context! { ..values, ..fixed }).expect("the template uses given values only")
+    template.render(values).expect("the template uses given values only")
 }
 
 /// Returns a script without a closing tag, which would end its element.

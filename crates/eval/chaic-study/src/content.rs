@@ -2,13 +2,38 @@
 
 use chaic_env::CHAIC_VERSION;
 use serde_json::{Value, json};
+use sha2::{Digest as _, Sha256};
 
 use crate::data;
-use crate::plan::{Plan, SEED, Trial};
-use crate::study::Seat;
+use crate::plan::{Condition, Plan, SEED, Trial, hex};
+use crate::study::{PlaySettings, Seat, Simulator};
 
-/// Returns the content of the page of a study.
+/// Returns the content of the page of a study. If the simulator runs on the server, neither episodes nor goals
+/// follow from it: the page has no episodes, no names of conditions and no digest of them.
 pub fn page_content(plan: &Plan) -> Value {
+    let mut content = full_content(plan);
+    if plan.study().play.simulator == Simulator::Server {
+        let conditions = plan.conditions().iter();
+        let shown =
+            |condition: &Condition| json!({ "seat": condition.seat, "input": condition.input });
+        content["conditions"] = conditions.map(shown).collect();
+        let rows = (1..=plan.study().participants).map(|slot| {
+            let trials = plan.trials(slot).into_iter();
+            trials.map(|trial| json!([trial.position, trial.condition])).collect::<Value>()
+        });
+        content["slots"] = rows.collect();
+        let PlaySettings { world, speed, simulator, .. } = &plan.study().play;
+        content["play"] = json!({ "world": world, "speed": speed, "simulator": simulator });
+        content["episodes"] = json!([]);
+        // The digest of the study would confirm a guess of its episodes.
+        content["digest"] = Value::Null;
+        content["digest"] = json!(hex(&Sha256::digest(content.to_string())));
+    }
+    content
+}
+
+/// Returns the content of a page that runs the simulator.
+fn full_content(plan: &Plan) -> Value {
     let study = plan.study();
     let forms: serde_json::Map<String, Value> =
         plan.forms().into_iter().map(|(name, form)| (name.to_owned(), json!(form))).collect();

@@ -34,7 +34,8 @@ pub use record_check::RecordCheck;
 pub use simulation::{Balance, simulate};
 pub use slots::{SlotHolder, lowest_free_slot};
 pub use study::{
-    Design, Factors, FormPlan, Input, MAX_PARTICIPANTS, PlaySettings, Seat, Study, WorldPace,
+    Design, Factors, FormPlan, Input, MAX_PARTICIPANTS, PlaySettings, Seat, Simulator, Study,
+    WorldPace,
 };
 
 #[cfg(test)]

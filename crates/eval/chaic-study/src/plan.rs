@@ -334,7 +334,12 @@ fn digest(study: &Study, episodes: &[Episode]) -> String {
         hash.update("\n");
         hash.update(episode.to_json_line());
     }
-    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+    hex(&hash.finalize())
+}
+
+/// Returns bytes as hexadecimal digits.
+pub(crate) fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// Returns the first digits of a digest.

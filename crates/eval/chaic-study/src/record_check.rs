@@ -48,6 +48,11 @@ impl RecordCheck {
         &self.trials
     }
 
+    /// Returns whether a trial runs; `None` if it has not begun.
+    pub fn is_running(&self, trial: usize) -> Option<bool> {
+        self.running.get(&trial).copied()
+    }
+
     /// Returns whether the participant has finished: the last record is `complete`.
     pub fn is_complete(&self) -> bool {
         self.is_complete

@@ -90,6 +90,23 @@ pub enum WorldPace {
     GoesOn,
 }
 
+/// Place where the simulator runs while a person plays.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Simulator {
+    /// The page, which contains the episodes with their goals.
+    #[default]
+    Page,
+    /// The server, which sends pictures and the state of the person's agent.
+    Server,
+}
+
+impl Simulator {
+    fn is_page(&self) -> bool {
+        *self == Simulator::Page
+    }
+}
+
 /// Settings of all episodes, unless a factor differs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -109,6 +126,9 @@ pub struct PlaySettings {
     /// Simulated seconds per second: 1, 2, 4 or 8.
     #[serde(default = "one")]
     pub speed: u32,
+    /// Place where the simulator runs. The default is not part of the digest.
+    #[serde(default, skip_serializing_if = "Simulator::is_page")]
+    pub simulator: Simulator,
 }
 
 fn partner() -> Seat {
@@ -134,7 +154,8 @@ fn one() -> u32 {
 impl Default for PlaySettings {
     fn default() -> PlaySettings {
         let (seat, helper, input) = (partner(), no_helper(), plans());
-        PlaySettings { seat, helper, input, world: waits(), speed: one() }
+        let simulator = Simulator::Page;
+        PlaySettings { seat, helper, input, world: waits(), speed: one(), simulator }
     }
 }
 

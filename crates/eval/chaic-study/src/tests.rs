@@ -71,6 +71,7 @@ fn errors_name_the_key_and_the_expectation() {
         ("\"none\", \"rhp\", \"infer\"]", "\"rhp\"]", "`factors.helper` must have from 2"),
         ("[forms]", "seat = [\"partner\", \"helper\"]\n[forms]", "`factors.helper` needs"),
         ("[forms]", "[play]\nspeed = 3\n[forms]", "`play.speed` must be 1, 2, 4 or 8, not 3"),
+        ("[forms]", "[play]\nsimulator = \"cloud\"\n[forms]", "unknown variant `cloud`"),
         ("\"trust\"", "\"trusts\"", "no form `trusts`; expected one of nasa_tlx, sus"),
         ("\"trust\"", "\"trust\", \"trust\"", "must not repeat `trust`"),
     ] {
@@ -180,4 +181,29 @@ fn the_page_has_all_trials_and_no_more_than_it_needs() {
     assert_eq!(content["digest"], plan.digest());
     let forms = content["forms"].as_object().expect("an object");
     assert_eq!(forms.keys().collect::<Vec<_>>(), ["sus", "trust"]);
+}
+
+/// With the simulator on the server, the page does not depend on the episodes, factor levels or digest. The page
+/// with the simulator is the positive control.
+#[test]
+fn the_page_of_a_server_with_the_simulator_has_nothing_from_which_a_goal_follows() {
+    let server = SMALL.replace("[factors]", "[play]\nsimulator = \"server\"\n[factors]");
+    let other = |definition: &str| definition.replace("high_target", "low_target");
+    assert_eq!(page_content(&plan(&server)), page_content(&plan(&other(&server))));
+    assert_ne!(page_content(&plan(SMALL)), page_content(&plan(&other(SMALL))));
+    let text = page_content(&plan(&server)).to_string();
+    for hidden in ["target", "goal", "setup", "rhp", plan(&server).digest()] {
+        assert!(!text.contains(hidden), "{hidden}");
+    }
+    for hidden in ["high_target/test/00", "goal", "setup", "rhp", plan(SMALL).digest()] {
+        assert!(page_content(&plan(SMALL)).to_string().contains(hidden), "{hidden}");
+    }
+}
+
+#[test]
+fn the_default_simulator_does_not_change_the_digest() {
+    let page = SMALL.replace("[factors]", "[play]\nsimulator = \"page\"\n[factors]");
+    assert_eq!(plan(&page).digest(), plan(SMALL).digest());
+    let server = SMALL.replace("[factors]", "[play]\nsimulator = \"server\"\n[factors]");
+    assert_ne!(plan(&server).digest(), plan(SMALL).digest());
 }

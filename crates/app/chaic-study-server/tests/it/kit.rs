@@ -30,6 +30,22 @@ helper = ["none", "rhp"]
 at_end = ["trust"]
 "#;
 
+/// A study in which the server simulates, and the person is the helper.
+pub const SIMULATED: &str = r#"title = "Shelves"
+consent = "text.txt"
+instructions = "text.txt"
+debrief = "text.txt"
+completion_code = "DONE"
+participants = 3
+timeout_minutes = 60
+design = "latin_square"
+episodes = ["high_target/test/00"]
+
+[play]
+simulator = "server"
+seat = "helper"
+"#;
+
 /// A folder with a study, and the data in it.
 pub struct Folder {
     dir: tempfile::TempDir,
@@ -151,7 +167,7 @@ pub fn exchange(address: SocketAddr, bytes: &[u8]) -> Option<Answer> {
     let _ = stream.write_all(bytes);
     let mut answer = Vec::new();
     let _ = stream.read_to_end(&mut answer);
-    Answer::parse(&String::from_utf8_lossy(&answer))
+    Answer::parse(&answer)
 }
 
 /// An answer of the server.
@@ -160,13 +176,26 @@ pub struct Answer {
     pub status: u16,
     pub head: String,
     pub body: String,
+    /// The body as sent.
+    pub bytes: Vec<u8>,
 }
 
 impl Answer {
-    fn parse(text: &str) -> Option<Answer> {
-        let (head, body) = text.split_once("\r\n\r\n")?;
+    fn parse(answer: &[u8]) -> Option<Answer> {
+        let end = answer.windows(4).position(|bytes| bytes == b"\r\n\r\n")?;
+        let head = String::from_utf8_lossy(&answer[..end]).to_lowercase();
         let status = head.split(' ').nth(1)?.parse().ok()?;
-        Some(Answer { status, head: head.to_lowercase(), body: body.to_owned() })
+        let bytes = answer[end + 4..].to_vec();
+        let body = String::from_utf8_lossy(&bytes).into_owned();
+        Some(Answer { status, head, body, bytes })
+    }
+
+    /// Returns the state and the picture of a turn.
+    pub fn turn(&self) -> (Value, &[u8]) {
+        assert_eq!(self.status, 200, "{self:?}");
+        let end = self.bytes.iter().position(|byte| *byte == b'\n').expect("a line");
+        let state = serde_json::from_slice(&self.bytes[..end]).expect("JSON");
+        (state, &self.bytes[end + 1..])
     }
 
     pub fn json(&self) -> Value {
@@ -214,6 +243,22 @@ impl Client {
 
     pub fn append(&self, from: usize, lines: &[String]) -> Answer {
         self.request("PUT", &format!("/records/{from}"), &lines.concat())
+    }
+
+    /// Enters and begins the first trial.
+    pub fn begin(&self) {
+        self.slot();
+        assert_eq!(self.append(1, &["{\"type\":\"trial\",\"trial\":0}\n".to_owned()]).stored(), 2);
+    }
+
+    /// Opens an episode.
+    pub fn open(&self, trial: usize) -> Answer {
+        self.request("PUT", &format!("/trials/{trial}"), "")
+    }
+
+    /// Sends a turn of an episode.
+    pub fn turn(&self, trial: usize, number: u64, turn: &Value) -> Answer {
+        self.request("PUT", &format!("/trials/{trial}/turns/{number}"), &turn.to_string())
     }
 
     /// Enters and returns the slot.

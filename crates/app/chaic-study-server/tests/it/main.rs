@@ -4,4 +4,6 @@ mod hostile;
 mod kit;
 mod load;
 mod participation;
+mod play;
 mod restart;
+mod secrecy;

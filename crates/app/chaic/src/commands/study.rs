@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use chaic_core::AgentId;
 use chaic_eval::trace_file;
 use chaic_export::lerobot::{LeRobotOptions, LeRobotWriter};
@@ -10,7 +10,7 @@ use chaic_files::write_atomically;
 use chaic_page::study_page;
 use chaic_study::deletion::{DERIVED, delete};
 use chaic_study::export::{VerifiedTrial, export};
-use chaic_study::{Balance, Plan, Seat, Study, Trial, page_content, simulate};
+use chaic_study::{Balance, Plan, Seat, Simulator, Study, Trial, page_content, simulate};
 use serde_json::json;
 
 use super::{bars, table};
@@ -57,6 +57,7 @@ fn check(arguments: &StudyCheckArguments, format: OutputFormat) -> Result<ExitSt
         "episodes": plan.episodes().iter().map(|episode| episode.id()).collect::<Vec<_>>(),
         "slots": plan.study().participants,
         "minutes": plan.length_minutes(),
+        "simulator": plan.study().play.simulator,
         "simulation": {
             "arrived": balance.arrived,
             "completed": balance.completed,
@@ -86,7 +87,7 @@ fn check_text(plan: &Plan, balance: &Balance, dropout: u8) -> String {
     let [low, high] = balance.range();
     format!(
         "{}\ndigest {}\n{} for {}; orders of conditions: {}\nat least {:.0} minutes, if all episodes \
-         are played to their end\n\n{counts}\nsimulated: {arrived} arrive, {dropout} % drop out, \
+         are played to their end\n{}\n\n{counts}\nsimulated: {arrived} arrive, {dropout} % drop out, \
          {completed} complete{}\nlargest minus smallest count: {} (from {low} to {high}; {})\n",
         plan.study().title,
         plan.digest(),
@@ -94,6 +95,14 @@ fn check_text(plan: &Plan, balance: &Balance, dropout: u8) -> String {
         counted(plan.study().participants as usize, "slot"),
         orders.join(" | "),
         plan.length_minutes(),
+        match plan.study().play.simulator {
+            Simulator::Page => {
+                "the page simulates the episodes, so it contains their goals"
+            }
+            Simulator::Server => {
+                "the server simulates the episodes, so the page has no goals; it needs `chaic study serve`"
+            }
+        },
         if *late == 0 {
             String::new()
         } else {
@@ -108,6 +117,13 @@ fn check_text(plan: &Plan, balance: &Balance, dropout: u8) -> String {
 fn build(arguments: &StudyBuildArguments, format: OutputFormat) -> Result<ExitStatus> {
     let StudyBuildArguments { study, out } = arguments;
     let plan = read(study)?;
+    if plan.study().play.simulator == Simulator::Server {
+        bail!(
+            "{}: `play.simulator = \"server\"` needs a server; use `chaic study serve`, or \
+             `play.simulator = \"page\"` for a page that contains the goals",
+            study.display()
+        );
+    }
     let page = study_page(&plan.study().title, &page_content(&plan));
     write_atomically(out, page.as_bytes())?;
     let slots = plan.study().participants;

@@ -11,7 +11,7 @@ use crate::output::OutputFormat;
 pub fn run(arguments: &StudyServeArguments, format: OutputFormat) -> Result<ExitStatus> {
     use std::time::Instant;
 
-    use chaic_study::{Plan, Study};
+    use chaic_study::{Plan, Simulator, Study};
     use chaic_study_server::{ServerOptions, StudyServer};
     use serde_json::json;
 
@@ -21,6 +21,12 @@ pub fn run(arguments: &StudyServeArguments, format: OutputFormat) -> Result<Exit
     let StudyServeArguments { study, data, listen, hosts } = arguments;
     let plan = Plan::new(Study::read(study)?, study)?;
     let (digest, slots) = (plan.digest().to_owned(), plan.study().participants);
+    let goals = match plan.study().play.simulator {
+        Simulator::Page => {
+            "the page contains the goals of its episodes, so a participant can find them"
+        }
+        Simulator::Server => "the server simulates the episodes; the page has no goals",
+    };
     let options = ServerOptions { folder: data.clone(), listen: *listen, hosts: hosts.clone() };
     let start = Instant::now();
     let clock = Box::new(move || start.elapsed().as_secs());
@@ -30,7 +36,7 @@ pub fn run(arguments: &StudyServeArguments, format: OutputFormat) -> Result<Exit
     let counts = server.counts();
     let text = format!(
         "{url}: {}, digest {}; {} with {}, {} complete\n\
-         the page contains the goals of its episodes, so a participant can find them\n\
+         {goals}\n\
          Ctrl-C ends the server; the same command goes on\n",
         counted(slots as usize, "slot"),
         &digest[..8],

@@ -63,6 +63,23 @@ fn a_study_is_checked_and_built() {
 }
 
 #[test]
+fn a_simulator_on_the_server_is_explained_and_not_built() {
+    let dir = tempfile::tempdir().expect("the disk has space");
+    let at = dir.path();
+    write_study(at);
+    let printed = run_ok(at, &["study", "check", "study.toml"]);
+    assert!(printed.contains("the page simulates the episodes"), "{printed}");
+    let server = STUDY.replace("[factors]", "[play]\nsimulator = \"server\"\n\n[factors]");
+    fs::write(at.join("study.toml"), server).expect("the disk has space");
+    let printed = run_ok(at, &["study", "check", "study.toml"]);
+    assert!(printed.contains("the server simulates the episodes"), "{printed}");
+    let refused = run_err(at, &["study", "build", "study.toml", "--out", "none.html"]);
+    assert!(refused.contains("needs a server; use `chaic study serve`"), "{refused}");
+    assert_eq!(refused.lines().count(), 1, "{refused}");
+    assert!(!at.join("none.html").exists());
+}
+
+#[test]
 fn collected_files_are_exported_and_deleted() {
     let dir = tempfile::tempdir().expect("the disk has space");
     let at = dir.path();

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use sha2::{Digest as _, Sha256};
 
 use crate::data;
-use crate::plan::{Condition, Plan, SEED, Trial, hex};
+use crate::plan::{Plan, SEED, Trial, hex};
 use crate::study::{PlaySettings, Seat, Simulator};
 
 /// Returns the content of the page of a study. If the simulator runs on the server, neither episodes nor goals
@@ -13,15 +13,24 @@ use crate::study::{PlaySettings, Seat, Simulator};
 pub fn page_content(plan: &Plan) -> Value {
     let mut content = full_content(plan);
     if plan.study().play.simulator == Simulator::Server {
-        let conditions = plan.conditions().iter();
-        let shown =
-            |condition: &Condition| json!({ "seat": condition.seat, "input": condition.input });
-        content["conditions"] = conditions.map(shown).collect();
+        // The order of the conditions follows from the digest of the study, so conditions that look equal are one.
+        let mut kinds: Vec<Value> = Vec::new();
+        let mut kind_of = Vec::new();
+        for condition in plan.conditions() {
+            let kind = json!({ "seat": condition.seat, "input": condition.input });
+            let found = kinds.iter().position(|known| *known == kind);
+            kind_of.push(found.unwrap_or(kinds.len()));
+            if found.is_none() {
+                kinds.push(kind);
+            }
+        }
         let rows = (1..=plan.study().participants).map(|slot| {
             let trials = plan.trials(slot).into_iter();
-            trials.map(|trial| json!([trial.position, trial.condition])).collect::<Value>()
+            let row = |trial: Trial| json!([trial.position, kind_of[trial.condition]]);
+            trials.map(row).collect::<Value>()
         });
         content["slots"] = rows.collect();
+        content["conditions"] = json!(kinds);
         let PlaySettings { world, speed, simulator, .. } = &plan.study().play;
         content["play"] = json!({ "world": world, "speed": speed, "simulator": simulator });
         content["episodes"] = json!([]);

@@ -65,8 +65,7 @@ impl Estimate {
         let all = self.all.mean()?;
         let (mut sum, mut longest) = (Duration::ZERO, Duration::ZERO);
         for (group, n) in self.unfinished.iter().filter(|(_, n)| **n > 0) {
-            let known =
-                self.by_task_and_helper.get(group).or_else(|| self.by_helper.get(&group.1));
+            let known = self.by_task_and_helper.get(group).or_else(|| self.by_helper.get(&group.1));
             let one = known.and_then(Times::mean).unwrap_or(all);
             sum += one * *n;
             longest = longest.max(one);

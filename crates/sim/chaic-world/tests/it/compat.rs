@@ -29,6 +29,41 @@ fn z(w: &World) -> f32 {
 const BLOCKED: Outcome = Outcome::Failure(FailureReason::Blocked);
 
 #[test]
+fn compat_has_the_rules_of_the_original_and_no_other_differences() {
+    let (paper, mut rules) = (Rules::paper(), Rules::compat());
+    let d = rules.durations;
+    // Facts S9.4, S9.3, S2.2 and S1.4.
+    assert_eq!(
+        [d.await_partner, d.raise_furniture, d.refused_pick, d.vain_grasp],
+        [3000, 17, 37, 0]
+    );
+    assert_eq!((rules.blocking, rules.reach_to), (Blocking::Creeps, ReachTo::Middle));
+    assert_eq!((rules.joint_lift, rules.furniture_reach_limit_m), (JointLift::LastChoice, 3.0));
+    assert!(rules.tells_removed && rules.dropped_counts && rules.delivered_anywhere);
+    assert!(!rules.containers_with_wheelchair && !rules.fragile_targets);
+    assert_eq!([rules.break_chance_low, rules.break_chance_high], [0.0, 0.0]);
+    rules.durations.await_partner = paper.durations.await_partner;
+    rules.durations.raise_furniture = paper.durations.raise_furniture;
+    rules.durations.refused_pick = paper.durations.refused_pick;
+    rules.durations.vain_grasp = paper.durations.vain_grasp;
+    let without = Rules {
+        blocking: paper.blocking,
+        reach_to: paper.reach_to,
+        joint_lift: paper.joint_lift,
+        furniture_reach_limit_m: paper.furniture_reach_limit_m,
+        tells_removed: paper.tells_removed,
+        dropped_counts: paper.dropped_counts,
+        delivered_anywhere: paper.delivered_anywhere,
+        containers_with_wheelchair: paper.containers_with_wheelchair,
+        fragile_targets: paper.fragile_targets,
+        break_chance_low: paper.break_chance_low,
+        break_chance_high: paper.break_chance_high,
+        ..rules
+    };
+    assert_eq!(without, paper);
+}
+
+#[test]
 fn creeping_agents_pass_through_walls_at_half_speed() {
     let setup = || {
         let mut setup = hall(vec![], vec![person(Persona::Adult, 0.0, 0.6)]);

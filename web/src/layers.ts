@@ -189,13 +189,13 @@ export class MapLayers {
     return html`<p>
         <b>Limits</b>: the partner (${partner.person}) reaches tops from ${low} to ${high} m and lifts
         ${partner.strength_kg.toFixed(0)} kg.
-        ${beyond.length === 0 ? "No object of the task is beyond these limits." : "Beyond these limits:"}
       </p>
       ${limitsChart(partner, objects)}
       <p class="small">
         Objects of the task by mass and height of their tops. The region is what the partner can pick up; circles are in
         it.
       </p>
+      <p>${beyond.length === 0 ? "No object of the task is beyond these limits." : "Beyond these limits:"}</p>
       <ul>
         ${beyond.map(
           ({ name, limits, top_m, mass_kg }) => html`<li>

@@ -14,6 +14,7 @@
 //! - No part of a request becomes a path, except a valid participant code.
 
 mod access;
+mod app;
 mod error;
 mod limits;
 mod log;
@@ -26,11 +27,11 @@ mod sessions;
 mod store;
 mod token_bucket;
 
+pub use app::{Clock, Reporter};
 pub use error::{Result, ServerError};
 pub use limits::{
     ENTRY_RATE, MAX_BODY_BYTES, MAX_SESSIONS, MAX_TURN_BYTES, MAX_TURN_FRAMES, PARTICIPANT_RATE,
     Rate, SESSION_IDLE_SECS, TURN_RATE,
 };
-pub use routes::{Clock, Reporter};
 pub use server::{ServerOptions, StudyServer};
 pub use store::Counts;

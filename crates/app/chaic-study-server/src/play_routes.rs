@@ -8,9 +8,7 @@
 //!
 //! Simulating and drawing run on as many threads as the machine has cores, apart from those that handle requests.
 
-use std::num::NonZeroUsize;
 use std::sync::Arc;
-use std::thread::available_parallelism;
 
 use axum::Router;
 use axum::body::Bytes;
@@ -20,33 +18,15 @@ use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse as _, Response};
 use axum::routing::{get, put};
 use chaic_study::data::is_code;
-use tokio::sync::Semaphore;
 use tokio::task::spawn_blocking;
 
 use crate::access::TokenDigest;
+use crate::app::{
+    App, Play, json_response, no_such_page, read_text, refusal_response, server_failure,
+};
 use crate::limits::MAX_TURN_BYTES;
 use crate::refusal::Refusal;
-use crate::routes::{
-    App, json_response, no_such_page, read_text, refusal_response, server_failure,
-};
-use crate::sessions::{Sessions, Turn};
-
-/// Episodes that participants play.
-pub struct Play {
-    /// Open episodes.
-    pub sessions: Sessions,
-    /// Digest of the page, which stands for that of the study in answers.
-    pub page_digest: String,
-    threads: Semaphore,
-}
-
-impl Play {
-    /// Creates the state without open episodes.
-    pub fn new(page_digest: String) -> Play {
-        let n_threads = available_parallelism().map_or(1, NonZeroUsize::get);
-        Play { sessions: Sessions::default(), page_digest, threads: Semaphore::new(n_threads) }
-    }
-}
+use crate::sessions::Turn;
 
 /// Creates the routes.
 pub fn router() -> Router<Arc<App>> {

@@ -24,12 +24,12 @@ use tokio::sync::Semaphore;
 use tokio::time::{sleep, timeout};
 
 use crate::access::{AllowedHosts, is_host_name};
+use crate::app::{App, Clock, Play, Reporter};
 use crate::error::{Result, ServerError};
 use crate::limits::{
     HEADER_TIMEOUT, MAX_CONNECTIONS, MAX_HEADER_BYTES, STOP_TIMEOUT, WRITER_THREADS,
 };
-use crate::play_routes::Play;
-use crate::routes::{App, Clock, Reporter, router};
+use crate::routes::router;
 use crate::store::{Counts, Store};
 
 /// Threads that handle requests.

@@ -627,13 +627,13 @@
       ${s}`}limitsInWords({agents:t}){let e=t[kt],[s,r]=e.reach_m.map(a=>a.toFixed(2)),{objects:n}=this.data,o=n.filter(a=>a.limits.length>0);return c`<p>
         <b>Limits</b>: the partner (${e.person}) reaches tops from ${s} to ${r} m and lifts
         ${e.strength_kg.toFixed(0)} kg.
-        ${o.length===0?"No object of the task is beyond these limits.":"Beyond these limits:"}
       </p>
       ${Et(e,n)}
       <p class="small">
         Objects of the task by mass and height of their tops. The region is what the partner can pick up; circles are in
         it.
       </p>
+      <p>${o.length===0?"No object of the task is beyond these limits.":"Beyond these limits:"}</p>
       <ul>
         ${o.map(({name:a,limits:l,top_m:h,mass_kg:d})=>c`<li>
             ${l.map(p=>re[p].mark)} ${a}: ${l.map(p=>re[p].text).join(", ")}

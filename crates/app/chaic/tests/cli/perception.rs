@@ -2,11 +2,19 @@
 
 use std::fs;
 
-use super::{output_of, run_err, run_ok, text};
+use super::{output_of, run_err, run_ok, shorten, text};
 
-/// Arguments of a run of one episode with small images.
-const EVAL: [&str; 9] =
-    ["eval", "--task", "high_goal", "--first", "1", "--helper", "rhp", "--size", "64"];
+/// Arguments of a run of a short episode with small images.
+const EVAL: [&str; 7] = ["eval", "--episodes", "short", "--helper", "rhp", "--size", "64"];
+
+/// Returns a folder with a short episode in `short/`.
+fn short_episode() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("the disk has space");
+    let generate = ["episodes", "generate", "--task", "high_goal", "--seeds", "0..1"];
+    run_ok(folder.path(), &[&generate[..], &["--out", "short"]].concat());
+    shorten(&folder.path().join("short"));
+    folder
+}
 
 /// Configuration of a training with small images and one step of each stage.
 const TINY: &str = "
@@ -31,7 +39,7 @@ views = 1
 
 #[test]
 fn helpers_detect_objects_with_trained_weights() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = short_episode();
     let dir = folder.path();
     fs::write(dir.join("tiny.toml"), TINY).unwrap();
     let train = ["train", "detector", "--config", "tiny.toml", "--out", "training"];
@@ -74,7 +82,7 @@ fn helpers_detect_objects_with_trained_weights() {
 
 #[test]
 fn noisy_perception_is_recorded_and_unknown_ones_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = short_episode();
     let dir = folder.path();
     let json = r#"{"miss_rate_by_area": [[5, 0.1]], "misclassification_rate": 0.1, "false_positives_per_image": 0.5, "scores": [0.9, 0.5]}"#;
     fs::write(dir.join("rates.json"), json).unwrap();
@@ -102,7 +110,7 @@ episodes = 1
 
 #[test]
 fn helpers_recognize_behavior_with_trained_weights() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = short_episode();
     let dir = folder.path();
     fs::write(dir.join("tiny.toml"), TINY_BEHAVIOR).unwrap();
     run_ok(dir, &["train", "behavior", "--config", "tiny.toml", "--out", "training"]);
@@ -143,7 +151,7 @@ fn tracks_are_evaluated() {
 
 #[test]
 fn the_hidden_track_uses_images_alone_and_replays_show_detections() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = short_episode();
     let dir = folder.path();
     run_ok(dir, &[&EVAL[..], &["--track", "hidden", "--out", "run"]].concat());
     let scores = fs::read_to_string(dir.join("run/scores.json")).unwrap();
@@ -151,7 +159,7 @@ fn the_hidden_track_uses_images_alone_and_replays_show_detections() {
     let by = scores["helpers"]["rhp"]["perception"].as_str().unwrap();
     assert!(by.starts_with("learned ") && by.contains("behavior learned "), "{by}");
     assert!(dir.join("run/traces/high_goal/rhp").is_dir());
-    let replay = ["replay", "run", "high_goal/test/00", "--every", "900", "--out", "a.gif"];
+    let replay = ["replay", "run", "high_goal/gen/0", "--every", "20", "--out", "a.gif"];
     run_ok(dir, &[&replay[..], &["--fps", "5", "--masks"]].concat());
     assert!(fs::metadata(dir.join("a.gif")).unwrap().len() > 10_000);
     assert_eq!(scores["track"], "hidden");
@@ -166,7 +174,7 @@ fn the_hidden_track_uses_images_alone_and_replays_show_detections() {
     let merged = fs::read_to_string(dir.join("merged/run.json")).unwrap();
     assert!(merged.contains("\"track\": \"hidden\""), "{merged}");
     // A trace with more grants than the track allows.
-    let trace = dir.join("run/traces/high_goal/rhp/test-00-s0.jsonl");
+    let trace = dir.join("run/traces/high_goal/rhp/gen-0-s0.jsonl");
     let text = fs::read_to_string(&trace).unwrap();
     let (head, rest) = text.split_once('\n').unwrap();
     let mut header: serde_json::Value = serde_json::from_str(head).unwrap();

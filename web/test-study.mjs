@@ -7,13 +7,14 @@
 // `study-server`.
 
 import assert from "node:assert/strict";
-import { execFileSync, spawn, spawnSync } from "node:child_process";
-import { existsSync, mkdtempSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { execFileSync } from "node:child_process";
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { deflateRawSync, inflateRawSync } from "node:zlib";
 import { chaic, findings, launch, playTo, scrollWidth } from "./test-kit.mjs";
+import { dataFiles, end, heading, killServers, playByKeys, serve, skip, tabTo } from "./test-study-kit.mjs";
 
 const folder = mkdtempSync(join(tmpdir(), "chaic-study-"));
 const definition = join(folder, "study.toml");
@@ -53,6 +54,7 @@ before(async () => {
 });
 
 after(async () => {
+  killServers();
   await browser?.close();
   rmSync(folder, { recursive: true });
 });
@@ -70,35 +72,6 @@ async function open(hash, { path = file, ...options } = {}) {
 
 const databases = (page) => page.evaluate(async () => (await indexedDB.databases()).length);
 const records = (page) => page.evaluate(() => document.querySelector("chaic-study").log.records);
-
-/** Moves the focus by Tab to an element whose text or label matches, and presses a key there. */
-async function tabTo(page, wanted, key = "Enter") {
-  for (let n = 0; n < 80; n++) {
-    await page.keyboard.press("Tab");
-    const name = await page.evaluate(() => {
-      let focused = document.activeElement;
-      while (focused?.shadowRoot?.activeElement) focused = focused.shadowRoot.activeElement;
-      return `${focused?.textContent.trim()} ${focused?.getAttribute("aria-label") ?? ""}`;
-    });
-    if (wanted.test(name)) {
-      await page.keyboard.press(key);
-      return;
-    }
-  }
-  assert.fail(`no element ${wanted}`);
-}
-
-const heading = (page, text) => page.getByRole("heading", { level: 1, name: text }).waitFor();
-
-/** Presses the key of the first plan until a frame. */
-async function playByKeys(page, frame) {
-  for (;;) {
-    const shown = await page.evaluate(() => document.querySelector("chaic-play")?.shown);
-    if (shown?.frame >= frame) return;
-    if (shown?.status === "waiting") await page.keyboard.press("1");
-    await page.waitForTimeout(50);
-  }
-}
 
 /** Answers a form by keyboard: the first rating of each item, then one step to the right. */
 async function answer(page, n) {
@@ -315,37 +288,11 @@ test("axe finds nothing, and nothing is wider than the page", async () => {
   }
 });
 
-/** Starts `chaic study serve` and returns its process and address. */
-async function serve(data, listen = "127.0.0.1:0") {
-  const command = ["study", "serve", definition, "--data", data, "--listen", listen, "--format", "json"];
-  const server = spawn(chaic, command, { stdio: ["ignore", "pipe", "inherit"] });
-  let printed = "";
-  for await (const text of server.stdout) {
-    printed += text;
-    if (printed.trimEnd().endsWith("}")) break;
-  }
-  return { server, url: JSON.parse(printed).url };
-}
-
-/** Ends a server by Ctrl-C. */
-function end(server) {
-  return new Promise((resolve) => {
-    server.once("exit", (code) => resolve(code));
-    server.kill("SIGINT");
-  });
-}
-
 /** Waits until a condition of this process holds. */
 async function until(condition) {
   for (let n = 0; n < 600 && !condition(); n++) await new Promise((resolve) => setTimeout(resolve, 50));
   assert.ok(condition(), String(condition));
 }
-
-const probe = spawnSync(chaic, ["study", "serve", "absent.toml", "--data", "absent"], { encoding: "utf8" });
-const skip = probe.stderr.includes("no study server") ? "this build of chaic has no study server" : false;
-
-/** Returns the files of participants in a folder. */
-const dataFiles = (data) => (existsSync(data) ? readdirSync(data).filter((name) => name.endsWith(".jsonl")) : []);
 
 /** Waits until the only file of a folder has all records of the page, and returns them. */
 async function uploaded(page, data) {
@@ -359,7 +306,7 @@ async function uploaded(page, data) {
 
 test("a server has every record, whatever fails in between, and deletes them", { skip }, async () => {
   const data = join(folder, "interrupted");
-  let { server, url } = await serve(data);
+  let { server, url } = await serve(definition, data);
   const context = await browser.newContext({ viewport: { width: 1280, height: 900 } });
   const page = await context.newPage();
   page.on("pageerror", (error) => assert.fail(error.message));
@@ -386,7 +333,7 @@ test("a server has every record, whatever fails in between, and deletes them", {
   assert.equal(await end(server), 0);
   await playTo(page, 240);
   await page.getByText("There is no connection to the server").waitFor();
-  ({ server } = await serve(data, new URL(url).host));
+  ({ server } = await serve(definition, data, new URL(url).host));
   const before = await uploaded(page, data);
   await page.reload();
   await heading(page, /^Episode 2 of 3$/);
@@ -400,7 +347,7 @@ test("a server has every record, whatever fails in between, and deletes them", {
   await page.getByRole("button", { name: "Delete and stop" }).click();
   await page.getByText("The server has not confirmed the deletion yet").waitFor();
   assert.deepEqual(dataFiles(data), [`${code}.jsonl`]);
-  ({ server } = await serve(data, new URL(url).host));
+  ({ server } = await serve(definition, data, new URL(url).host));
   await page.reload();
   await page.getByText(/^All your data in this browser and on the server/).waitFor();
   assert.deepEqual(readdirSync(data).filter((name) => name !== ".lock"), []);
@@ -411,7 +358,7 @@ test("a server has every record, whatever fails in between, and deletes them", {
 
 test("a participation with a server gives data that verify", { skip }, async () => {
   const data = join(folder, "served");
-  const { server, url } = await serve(data);
+  const { server, url } = await serve(definition, data);
   const context = await browser.newContext({ viewport: { width: 1280, height: 900 } });
   const page = await context.newPage();
   page.on("pageerror", (error) => assert.fail(error.message));

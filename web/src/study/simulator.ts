@@ -74,7 +74,7 @@ export class ServerSimulator implements Simulator {
   }
 
   /** Handles an answer without content: the episode is over, closed or cannot go on. */
-  private async refused({ status, error }: Answer): Promise<void> {
+  private refused({ status, error }: Answer): void {
     // Requests end without an answer when the participant stops.
     if (status === 0) return;
     if (status === 410) this.send({ type: "over" });

@@ -69,8 +69,7 @@ fn the_slots_of_a_container_form_a_triangle_above_its_bottom() {
     let (basket, basket_size) = (&w.state().objects[1], size(&w, nth(0)));
     for i in 1..4 {
         let angle = std::f32::consts::TAU * (i - 1) as f32 / 3.0;
-        let local = Vec3::new(0.0, 0.12, 0.0) + 0.22 * forward(angle);
-        let local = local * basket_size;
+        let local = (0.12 * Vec3::Y + 0.22 * forward(angle)) * basket_size;
         let expected = basket.position + basket.rotation * local;
         assert!(position(&w, nth(i)).distance(expected) < 1e-4, "orange {i}: {expected}");
     }

@@ -7,6 +7,7 @@ declare module "*/chaic_web.js" {
     readonly width: number;
     readonly height: number;
     rgba(): Uint8Array;
+    labels(): string;
     free(): void;
   }
 

@@ -8,7 +8,7 @@ import { controls } from "./controls.js";
 import { doneAt, firstDifference, progressPath } from "./difference.js";
 import { clock } from "./frames.js";
 import type { DecisionLine, FrameState, Picture, ReplayInfo } from "./messages.js";
-import { drawnSize, MAX_PX, paint } from "./pictures.js";
+import { drawnSize, MAX_PX, paint, paintMap } from "./pictures.js";
 import { ReplayPlayer, type Source } from "./player.js";
 import { styles } from "./styles.js";
 import { timeline } from "./timeline.js";
@@ -96,7 +96,7 @@ export class ChaicCompare extends LitElement {
     const drawn = ({ state: shown, views, map }: { state: FrameState; views: Picture[]; map: Picture | null }) => {
       this.shown = replaced(this.shown, run, shown);
       if (views[0]) paint(this.viewCanvases[run], views[0]);
-      if (map) paint(this.mapCanvas, map);
+      if (map) paintMap(this.mapCanvas, map);
     };
     const failed = (message: string): void => {
       this.problem = message;

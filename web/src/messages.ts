@@ -150,6 +150,23 @@ export interface Picture {
   rgba: Uint8ClampedArray<ArrayBuffer>;
 }
 
+/** Line of text on a map, in pixels; colors are red, green and blue. */
+export interface MapLabel {
+  text: string;
+  /** Anchor on the baseline. */
+  at: [number, number];
+  font_px: number;
+  width_px: number;
+  align: "left" | "center" | "right";
+  color: [number, number, number];
+  border: [number, number, number] | null;
+}
+
+/** Map without its text, and the text. */
+export interface MapPicture extends Picture {
+  labels: MapLabel[];
+}
+
 /** Level of a person's decisions. */
 export type InputLevel = "plans" | "steps";
 
@@ -228,7 +245,7 @@ export interface Branch {
 /** Message of the worker. */
 export type Response =
   | { type: "opened"; info: ReplayInfo }
-  | { type: "frame"; state: FrameState; views: Picture[]; map: Picture | null; layers: LayerData }
+  | { type: "frame"; state: FrameState; views: Picture[]; map: MapPicture | null; layers: LayerData }
   | { type: "rerun"; state: RerunState }
   | { type: "playing"; info: LiveInfo }
   | { type: "live"; state: LiveState; view: Picture }

@@ -1,12 +1,22 @@
 // Player of one replay in a worker. Of several requests while the worker draws, only the last counts.
 
-import type { FrameState, LayerData, Picture, ReplayInfo, Request, RerunState, Response, Wanted } from "./messages.js";
+import type {
+  FrameState,
+  LayerData,
+  MapPicture,
+  Picture,
+  ReplayInfo,
+  Request,
+  RerunState,
+  Response,
+  Wanted,
+} from "./messages.js";
 
 /** Drawn frame. */
 export interface DrawnFrame {
   state: FrameState;
   views: Picture[];
-  map: Picture | null;
+  map: MapPicture | null;
   layers: LayerData;
 }
 

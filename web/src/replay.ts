@@ -8,7 +8,7 @@ import { clock, lastBefore } from "./frames.js";
 import { badge } from "./badge.js";
 import { MapLayers } from "./layers.js";
 import type { AgentInfo, Belief, FrameState, ReplayInfo, Wanted } from "./messages.js";
-import { drawnSize, MAX_PX, paint } from "./pictures.js";
+import { drawnSize, MAX_PX, paint, paintMap } from "./pictures.js";
 import { ReplayPlayer, type DrawnFrame, type Source } from "./player.js";
 import { styles } from "./styles.js";
 import { timeline } from "./timeline.js";
@@ -111,7 +111,7 @@ export class ChaicReplay extends LitElement {
     this.shown = shown;
     views.forEach((picture, k) => paint(this.viewCanvases[k], picture));
     if (!map || !this.info) return;
-    paint(this.mapCanvas, map);
+    paintMap(this.mapCanvas, map);
     this.layers.draw(this.layerCanvas, map, this.info.map_height, layers);
   }
 

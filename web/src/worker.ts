@@ -1,7 +1,18 @@
 // Worker that re-simulates, plays and draws, so that the page stays responsive.
 
 import { initSync, Live, Player, reference_rate } from "../pkg/chaic_web.js";
-import type { LayerData, Memory, Picture, ReplayInfo, Request, RerunState, Response, Wanted } from "./messages.js";
+import type {
+  LayerData,
+  MapLabel,
+  MapPicture,
+  Memory,
+  Picture,
+  ReplayInfo,
+  Request,
+  RerunState,
+  Response,
+  Wanted,
+} from "./messages.js";
 
 let player: Player | undefined;
 let live: Live | undefined;
@@ -72,11 +83,17 @@ function warmUp(wanted: Wanted): void {
   setTimeout(() => warmUp(wanted));
 }
 
+function drawnMap(from: Player, widthPx: number): MapPicture {
+  const picture = from.map(widthPx);
+  const labels: MapLabel[] = JSON.parse(picture.labels());
+  return { ...taken(picture), labels };
+}
+
 function drawFrame(request: Extract<Request, { type: "frame" }>): void {
   if (!player) return;
   const state = JSON.parse(player.seek(request.frame));
   const views = request.agents.map((agent) => taken(player!.view(agent, request.viewPx)));
-  const map = request.mapPx > 0 ? taken(player.map(request.mapPx)) : null;
+  const map = request.mapPx > 0 ? drawnMap(player, request.mapPx) : null;
   const pictures = map ? [...views, map] : views;
   const layers = layerData(player, request.memories, request.withLimits);
   send({ type: "frame", state, views, map, layers }, pictures.map((picture) => picture.rgba.buffer));

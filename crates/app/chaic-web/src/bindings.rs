@@ -3,7 +3,7 @@
 use chaic_core::AgentId;
 use wasm_bindgen::prelude::*;
 
-use crate::drawing::DrawnImage;
+use crate::drawing::{CanvasLabel, DrawnImage, DrawnMap};
 use crate::live::{LiveSession, reference};
 use crate::player::ReplayPlayer;
 
@@ -17,6 +17,13 @@ pub struct Player {
 #[wasm_bindgen]
 pub struct Picture {
     image: DrawnImage,
+    labels: Vec<CanvasLabel>,
+}
+
+impl From<DrawnImage> for Picture {
+    fn from(image: DrawnImage) -> Picture {
+        Picture { image, labels: Vec::new() }
+    }
 }
 
 fn error(problem: impl ToString) -> JsError {
@@ -61,7 +68,7 @@ impl Player {
     /// If the episode has no such agent.
     pub fn view(&self, agent: u8, side_px: u32) -> Result<Picture, JsError> {
         let image = self.player.draw_view(AgentId(agent), side_px).map_err(error)?;
-        Ok(Picture { image })
+        Ok(image.into())
     }
 
     /// Runs partner and helper again up to their next decision, and returns [`crate::RerunState`].
@@ -95,7 +102,8 @@ impl Player {
 
     /// Draws the map.
     pub fn map(&mut self, width_px: u32) -> Picture {
-        Picture { image: self.player.draw_map(width_px) }
+        let DrawnMap { image, labels } = self.player.draw_map(width_px);
+        Picture { image, labels }
     }
 }
 
@@ -177,7 +185,7 @@ impl Live {
 
     /// Draws what the person sees.
     pub fn view(&self, side_px: u32) -> Picture {
-        Picture { image: self.session.draw_view(side_px) }
+        self.session.draw_view(side_px).into()
     }
 }
 
@@ -207,5 +215,13 @@ impl Picture {
     /// Returns the bytes: red, green, blue and 255 of each pixel.
     pub fn rgba(&self) -> Vec<u8> {
         self.image.rgba.clone()
+    }
+
+    /// Returns a list of [`CanvasLabel`], empty for a view.
+    ///
+    /// # Errors
+    /// Never in practice.
+    pub fn labels(&self) -> Result<String, JsError> {
+        json(&self.labels)
     }
 }

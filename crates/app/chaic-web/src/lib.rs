@@ -18,7 +18,7 @@ mod memory_history;
 mod player;
 mod timeline;
 
-pub use drawing::DrawnImage;
+pub use drawing::{CanvasLabel, DrawnImage, DrawnMap};
 pub use limits::{Limit, TaskObject};
 pub use live::{
     InputLevel, LiveConfig, LiveError, LiveInfo, LiveInput, LiveSession, LiveState, LiveStatus,

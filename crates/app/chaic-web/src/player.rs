@@ -15,7 +15,7 @@ use chaic_render::{Channels, Scene, View};
 use chaic_world::World;
 use serde::Serialize;
 
-use crate::drawing::DrawnImage;
+use crate::drawing::{CanvasLabel, DrawnImage, DrawnMap};
 use crate::limits::{TaskObject, task_objects};
 use crate::memory_history::{MemoryHistory, MemoryState, RerunInfo, rounded};
 use crate::timeline::Timeline;
@@ -287,17 +287,20 @@ impl ReplayPlayer {
 
     /// Draws the map of the current frame, with the ring of the helper's belief about the partner's
     /// position if it records one.
-    pub fn draw_map(&mut self, width_px: u32) -> DrawnImage {
+    pub fn draw_map(&mut self, width_px: u32) -> DrawnMap {
         let kept = self.plan.take().filter(|plan| plan.width() == width_px);
         let world = self.current.world();
         let plan = kept.unwrap_or_else(|| FloorPlan::new(world, width_px));
-        let mut map = plan.draw(&self.scene, world);
+        let (mut map, labels) = plan.draw_without_text(&self.scene, world);
         self.plan = Some(plan);
         if let Some([x, z]) = self.belief().and_then(|belief| belief.position_cm) {
             let position = Vec2::new(0.01 * x as f32, 0.01 * z as f32);
             floor_plan::mark_believed_position(&mut map, world, AgentId::HELPER, position);
         }
-        DrawnImage::from_rgb(map.width(), map.height(), map.as_raw())
+        DrawnMap {
+            image: DrawnImage::from_rgb(map.width(), map.height(), map.as_raw()),
+            labels: labels.iter().map(CanvasLabel::new).collect(),
+        }
     }
 }
 

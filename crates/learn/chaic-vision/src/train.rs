@@ -67,6 +67,10 @@ pub struct DetectorTrainingConfig {
     pub crops: [CropConfig; 2],
     /// Distribution of views.
     pub views: ViewConfig,
+    /// Number of validation views on which a validation measures the precision.
+    pub validation_views: usize,
+    /// Number of training views, drawn as a helper sees them, that a validation calibrates scores on.
+    pub calibration_views: usize,
     /// Weights of the loss.
     pub loss: LossConfig,
     /// Training of the second stage.
@@ -106,6 +110,8 @@ impl DetectorTrainingConfig {
                 },
             ],
             views: ViewConfig::TRAINING,
+            validation_views: 200,
+            calibration_views: 400,
             loss: LossConfig::TRAINING,
             second_stage: RoiTrainingConfig::default(),
             adam: AdamWConfig::default(),
@@ -317,11 +323,6 @@ impl DetectorLearner {
     }
 }
 
-/// Number of views of a validation.
-const VALIDATION_VIEWS: usize = 200;
-/// Number of views for score calibration.
-const CALIBRATION_VIEWS: usize = 400;
-
 /// Maximum number of pixels that all shards process at once. A pixel takes 2.1 kB, which makes 9
 /// GB.
 const MAX_CROP_PX: usize = 1 << 22;
@@ -392,6 +393,8 @@ impl Trainer for DetectorLearner {
         ("shards", SHARDS),
         ("crops", Bound::Table(CROP_BOUNDS)),
         ("views", Bound::Table(VIEW_BOUNDS)),
+        ("validation_views", integer(1, 100_000)),
+        ("calibration_views", integer(1, 100_000)),
         ("loss", Bound::Table(LOSS_BOUNDS)),
         ("second_stage", Bound::Table(ROI_BOUNDS)),
         ("adam", ADAM),
@@ -501,11 +504,12 @@ impl Trainer for DetectorLearner {
 
     fn validate(&self, stop: &AtomicBool) -> Result<Option<(Metrics, Vec<u8>)>, WeightsError> {
         let mut detector = self.trained();
-        let (views, n_threads) = (self.config.views, self.config.shards);
-        let precision = evaluate(&detector, views, VALIDATION_VIEWS, n_threads, stop);
+        let DetectorTrainingConfig { views, shards, validation_views, calibration_views, .. } =
+            self.config;
+        let precision = evaluate(&detector, views, validation_views, shards, stop);
         let natural = ViewConfig { size_px: views.size_px, ..ViewConfig::NATURAL };
         let Some(precision) = precision else { return Ok(None) };
-        let calibration = calibrate(&detector, natural, CALIBRATION_VIEWS, n_threads, stop);
+        let calibration = calibrate(&detector, natural, calibration_views, shards, stop);
         let Some(calibration) = calibration else { return Ok(None) };
         detector.calibration = calibration;
         let metrics = metrics([("map50", precision.map50), ("map", precision.map)]);

@@ -2,15 +2,18 @@
 
 use chaic_core::geom::Rect;
 use chaic_core::{AgentId, EntityId, Role, Vec2, Vec3};
-use chaic_world::{ObjectLocation, RoomKind, Wall, World};
+use chaic_world::{ObjectLocation, Room, RoomKind, Wall, World};
 use image::{Rgb, RgbImage};
 
 use crate::draw::{Exclusions, Scratch, draw as draw_scene};
+use crate::paint::{blend, circle, disk, for_pixels_between, line, triangle};
 use crate::people::Body;
 use crate::projection::Projection;
 use crate::scene::Scene;
 use crate::shade::{OutputImages, shade};
-use crate::text::{self, Align, blend};
+#[cfg(feature = "text")]
+use crate::text;
+use crate::text_label::{Align, TextLabel};
 use crate::view::with_scratch;
 
 /// Height of the camera, meters: above every roof and tree.
@@ -27,11 +30,13 @@ const PEOPLE: [[u8; 3]; 3] = [[208, 64, 40], [16, 136, 140], [214, 160, 10]];
 /// Renders the map of a world, `width_px` wide (between 64 and [`crate::MAX_SIDE_PX`]), with a
 /// legend below. It shows room names, walls, target objects (rings), containers and obstacles, the
 /// goal place (frame), and the pose of each agent.
+#[cfg(feature = "text")]
 pub fn draw(world: &World, width_px: u32) -> RgbImage {
     draw_scene_plan(&Scene::new(world.setup()), world, width_px)
 }
 
 /// Renders the map with an existing scene.
+#[cfg(feature = "text")]
 pub fn draw_scene_plan(scene: &Scene, world: &World, width_px: u32) -> RgbImage {
     FloorPlan::new(world, width_px).draw(scene, world)
 }
@@ -71,14 +76,26 @@ impl FloorPlan {
     }
 
     /// Renders the current frame of the world.
+    #[cfg(feature = "text")]
     pub fn draw(&self, scene: &Scene, world: &World) -> RgbImage {
+        let (mut image, labels) = self.draw_without_text(scene, world);
+        for label in &labels {
+            text::draw_label(&mut image, label);
+        }
+        image
+    }
+
+    /// Renders the current frame of the world, and returns the text that belongs on it.
+    pub fn draw_without_text(&self, scene: &Scene, world: &World) -> (RgbImage, Vec<TextLabel>) {
         let map = Map::new(world, self.width);
         let mut image = render_base(scene, world, &map, self.width, self.height);
         self.tint_rooms(&mut image);
         mark_objects(&mut image, world, &map);
-        mark_people(&mut image, world, &map);
-        name_rooms(&mut image, world, &map);
-        with_legend(&image, world)
+        let mut labels = mark_people(&mut image, world, &map);
+        labels.extend(room_labels(world, &map, self.width));
+        let (image, legend) = with_legend(&image, world);
+        labels.extend(legend);
+        (image, labels)
     }
 
     /// Lightens everything but the walls, so that markers stand out, and colors it by the room.
@@ -96,7 +113,7 @@ impl FloorPlan {
     }
 }
 
-/// Marks on a map of [`draw_scene_plan`] the position (x, z) at which an agent believes another
+/// Marks on a map of [`FloorPlan`] the position (x, z) at which an agent believes another
 /// one: a ring in the color of the believing agent. The ring is wider than the disk of a person, so
 /// that both are visible at one place.
 pub fn mark_believed_position(
@@ -113,7 +130,7 @@ pub fn mark_believed_position(
     circle(image, at, radius, stroke_px, person_color(believer));
 }
 
-/// Returns where a map of [`draw_scene_plan`] shows a position (x, z): the distances from its left and
+/// Returns where a map of [`FloorPlan`] shows a position (x, z): the distances from its left and
 /// upper edge, relative to its width.
 pub fn position_on_map(world: &World, position_in_world: Vec2) -> Vec2 {
     let area = map_area(world);
@@ -121,7 +138,7 @@ pub fn position_on_map(world: &World, position_in_world: Vec2) -> Vec2 {
     map.px_from_xz(position_in_world)
 }
 
-/// Returns the height of a map of [`draw_scene_plan`] without its legend, relative to its width.
+/// Returns the height of a map of [`FloorPlan`] without its legend, relative to its width.
 pub fn relative_height(world: &World) -> f32 {
     let size = map_area(world).size();
     size.y / size.x
@@ -240,21 +257,27 @@ fn covers(wall: &Wall, p: Vec2) -> bool {
     p.distance(wall.a + along * t) <= 0.5 * wall.thickness_m
 }
 
-fn name_rooms(image: &mut RgbImage, world: &World, map: &Map) {
-    for room in &world.setup().rooms {
+/// Returns the names of the rooms that are wide enough.
+fn room_labels(world: &World, map: &Map, width_px: u32) -> Vec<TextLabel> {
+    let label = |room: &Room| {
         let (a, b) = (map.px_from_xz(room.rect.min), map.px_from_xz(room.rect.max));
         let name = room_name(room.kind);
-        let fits = (b.x - a.x) / text::width(name, 1.0).max(4.0) * 0.8;
-        let size = (0.022 * image.width() as f32).min(fits * 1.0).clamp(9.0, 26.0);
-        if text::width(name, size) > (b.x - a.x).max(20.0) || (b.y - a.y) < size {
-            continue;
+        let fits = (b.x - a.x) / TextLabel::width_px(name, 4.0).max(4.0) * 0.8;
+        let size_px = (0.022 * width_px as f32).min(fits).clamp(9.0, 26.0);
+        let is_too_wide = TextLabel::width_px(name, size_px) > (b.x - a.x).max(20.0);
+        if is_too_wide || (b.y - a.y) < size_px {
+            return None;
         }
-        let at = (0.5 * (a.x + b.x), a.y + 0.10 * (b.y - a.y));
-        for (dx, dy) in [(-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)] {
-            text::draw(image, (at.0 + dx, at.1 + dy), size, BACKGROUND, Align::Center, name);
-        }
-        text::draw(image, at, size, INK, Align::Center, name);
-    }
+        Some(TextLabel {
+            text: name.to_owned(),
+            top: Vec2::new(0.5 * (a.x + b.x), a.y + 0.10 * (b.y - a.y)),
+            size_px,
+            align: Align::Center,
+            color: INK,
+            border: Some(BACKGROUND),
+        })
+    };
+    world.setup().rooms.iter().filter_map(label).collect()
 }
 
 /// Returns the marker color of an object; `None` if it has no marker.
@@ -315,7 +338,9 @@ fn person_radius_px(image: &RgbImage, map: &Map) -> f32 {
     (0.26 * map.px_per_m).max(0.009 * image.width() as f32)
 }
 
-fn mark_people(image: &mut RgbImage, world: &World, map: &Map) {
+/// Draws the agents and returns their letters.
+fn mark_people(image: &mut RgbImage, world: &World, map: &Map) -> Vec<TextLabel> {
+    let mut letters = Vec::new();
     let radius = person_radius_px(image, map);
     for agent in world.setup().agents() {
         let pose = world.state().agents[agent.index()].pose;
@@ -327,13 +352,21 @@ fn mark_people(image: &mut RgbImage, world: &World, map: &Map) {
         triangle(image, [nose, base + side, base - side], INK);
         disk(image, at, radius * 1.16, BACKGROUND);
         disk(image, at, radius, color);
-        let letter = &agent.role_name()[..1];
-        let size = 1.5 * radius;
-        text::draw(image, (at.x, at.y - 0.58 * size), size, BACKGROUND, Align::Center, letter);
+        let size_px = 1.5 * radius;
+        letters.push(TextLabel {
+            text: agent.role_name()[..1].to_owned(),
+            top: at - Vec2::new(0.0, 0.58 * size_px),
+            size_px,
+            align: Align::Center,
+            color: BACKGROUND,
+            border: None,
+        });
     }
+    letters
 }
 
-fn with_legend(map: &RgbImage, world: &World) -> RgbImage {
+/// Returns the map with the symbols of a legend below, and the text of the legend.
+fn with_legend(map: &RgbImage, world: &World) -> (RgbImage, Vec<TextLabel>) {
     let size = (0.017 * map.width() as f32).clamp(9.0, 22.0);
     let pad = 0.7 * size;
     let mut entries: Vec<([u8; 3], String, bool)> = world
@@ -357,7 +390,7 @@ fn with_legend(map: &RgbImage, world: &World) -> RgbImage {
     let (mut x, mut y) = (pad, 0.0);
     let mut placed = Vec::new();
     for (color, label, filled) in entries {
-        let width_px = text::width(&label, size) + 2.6 * size;
+        let width_px = TextLabel::width_px(&label, size) + 2.6 * size;
         if x + width_px > map.width() as f32 && x > pad {
             (x, y) = (pad, y + 1.6 * size);
         }
@@ -368,75 +401,22 @@ fn with_legend(map: &RgbImage, world: &World) -> RgbImage {
     let mut out = RgbImage::from_pixel(map.width(), map.height() + height_px, Rgb(BACKGROUND));
     image::imageops::replace(&mut out, map, 0, 0);
     let top = map.height() as f32 + 0.5 * size;
-    for (x, y, color, label, filled) in placed {
+    let mut labels = Vec::new();
+    for (x, y, color, text, filled) in placed {
         let dot = Vec2::new(x + 0.5 * size, top + y + 0.6 * size);
         if filled {
             disk(&mut out, dot, 0.5 * size, color);
         } else {
             circle(&mut out, dot, 0.45 * size, 0.22 * size, color);
         }
-        text::draw(&mut out, (x + 1.4 * size, top + y), size, INK, Align::Left, &label);
+        labels.push(TextLabel {
+            text,
+            top: Vec2::new(x + 1.4 * size, top + y),
+            size_px: size,
+            align: Align::Left,
+            color: INK,
+            border: None,
+        });
     }
-    out
-}
-
-/// Calls `paint` with the center and the value of each pixel between two corners.
-fn for_pixels(image: &mut RgbImage, a: Vec2, b: Vec2, mut paint: impl FnMut(Vec2, &mut [u8; 3])) {
-    for_pixels_between(image.dimensions(), a, b, |x, y| {
-        paint(Vec2::new(x as f32 + 0.5, y as f32 + 0.5), &mut image.get_pixel_mut(x, y).0);
-    });
-}
-
-/// Calls `visit` with column and row of each pixel between two corners, row by row.
-fn for_pixels_between(
-    (width, height): (u32, u32),
-    a: Vec2,
-    b: Vec2,
-    mut visit: impl FnMut(u32, u32),
-) {
-    let clip = |x: f32, n: u32| x.clamp(0.0, n as f32) as u32;
-    let (low, high) = (a.min(b), a.max(b));
-    for y in clip(low.y, height)..clip(high.y + 1.0, height) {
-        for x in clip(low.x, width)..clip(high.x + 1.0, width) {
-            visit(x, y);
-        }
-    }
-}
-
-fn disk(image: &mut RgbImage, at: Vec2, radius: f32, color: [u8; 3]) {
-    for_pixels(image, at - radius - 1.0, at + radius + 1.0, |p, pixel| {
-        blend(pixel, color, radius + 0.5 - (p - at).length_squared().sqrt());
-    });
-}
-
-fn circle(image: &mut RgbImage, at: Vec2, radius: f32, stroke_px: f32, color: [u8; 3]) {
-    let reach = radius + stroke_px + 1.0;
-    for_pixels(image, at - reach, at + reach, |p, pixel| {
-        let distance = ((p - at).length_squared().sqrt() - radius).abs();
-        blend(pixel, color, 0.5 * stroke_px + 0.5 - distance);
-    });
-}
-
-fn line(image: &mut RgbImage, a: Vec2, b: Vec2, stroke_px: f32, color: [u8; 3]) {
-    let reach = Vec2::splat(stroke_px + 1.0);
-    let along = b - a;
-    let l2 = along.length_squared().max(1e-6);
-    for_pixels(image, a.min(b) - reach, a.max(b) + reach, |p, pixel| {
-        let t = ((p - a).dot(along) / l2).clamp(0.0, 1.0);
-        let distance = (p - a - along * t).length_squared().sqrt();
-        blend(pixel, color, 0.5 * stroke_px + 0.5 - distance);
-    });
-}
-
-fn triangle(image: &mut RgbImage, [a, b, c]: [Vec2; 3], color: [u8; 3]) {
-    let side = |p: Vec2, q: Vec2, r: Vec2| (q - p).perp_dot(r - p);
-    let orientation = side(a, b, c);
-    for_pixels(image, a.min(b).min(c), a.max(b).max(c), |p, pixel| {
-        if side(a, b, p) * orientation >= 0.0
-            && side(b, c, p) * orientation >= 0.0
-            && side(c, a, p) * orientation >= 0.0
-        {
-            *pixel = color;
-        }
-    });
+    (out, labels)
 }

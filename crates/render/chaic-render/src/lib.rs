@@ -75,11 +75,15 @@ pub mod floor_plan;
 pub mod geometry;
 pub mod image_out;
 pub mod lighting;
+mod paint;
+#[cfg(feature = "text")]
 pub mod text;
+mod text_label;
 
 pub use appearance::Appearance;
 pub use labels::{Labels, depth_mm};
 pub use projection::Projection;
 pub use scene::{Scene, WorldViews, render_batch};
 pub use solids::LEVEL_RADIUS_PX;
+pub use text_label::{Align, TextLabel};
 pub use view::{Channels, ImagesMut, MAX_SIDE_PX, View, with_each_width};

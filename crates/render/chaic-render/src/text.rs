@@ -5,20 +5,13 @@ use std::sync::LazyLock;
 use ab_glyph::{Font as _, FontRef, Glyph, PxScale, ScaleFont as _, point};
 use image::RgbImage;
 
+use crate::paint::blend;
+pub use crate::text_label::Align;
+use crate::text_label::TextLabel;
+
 static FONT: LazyLock<FontRef<'static>> = LazyLock::new(|| {
     FontRef::try_from_slice(epaint_default_fonts::HACK_REGULAR).expect("the bundled font is valid")
 });
-
-/// Horizontal alignment of a text relative to its anchor point.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Align {
-    /// The text begins at the anchor.
-    Left,
-    /// The text is centered on the anchor.
-    Center,
-    /// The text ends at the anchor.
-    Right,
-}
 
 /// Glyphs of one line from x = 0 with the baseline at y = 0, and the width of the line.
 fn layout_line(text: &str, size_px: f32) -> (Vec<Glyph>, f32) {
@@ -80,12 +73,18 @@ pub fn draw(
     }
 }
 
-/// Blends `color` into a pixel.
-pub(crate) fn blend(pixel: &mut [u8; 3], color: [u8; 3], amount: f32) {
-    let amount = amount.clamp(0.0, 1.0);
-    for (p, c) in pixel.iter_mut().zip(color) {
-        *p = (f32::from(*p) + (f32::from(c) - f32::from(*p)) * amount + 0.5) as u8;
+/// Draws a label with its border.
+pub(crate) fn draw_label(image: &mut RgbImage, label: &TextLabel) {
+    let TextLabel { text, top, size_px, align, color, border } = label;
+    let mut draw_at = |dx, dy, color| {
+        draw(image, (top.x + dx, top.y + dy), *size_px, color, *align, text);
+    };
+    if let Some(border) = border {
+        for (dx, dy) in [(-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)] {
+            draw_at(dx, dy, *border);
+        }
     }
+    draw_at(0.0, 0.0, *color);
 }
 
 #[cfg(test)]
@@ -100,5 +99,7 @@ mod tests {
         assert!((60..800).contains(&ink), "{ink}");
         draw(&mut image, (-30.0, -8.0), 50.0, [0; 3], Align::Left, "far outside");
         assert!(width("ww", 20.0) > width("w", 20.0));
+        let (text, size_px) = ("wanted: 2 apple", 17.0);
+        assert!((width(text, size_px) - TextLabel::width_px(text, size_px)).abs() < 0.01);
     }
 }

@@ -16,10 +16,12 @@ fn short_episode() -> tempfile::TempDir {
     folder
 }
 
-/// Configuration of a training with small images and one step of each stage.
+/// Configuration of a training with few small images and one step of each stage.
 const TINY: &str = "
 steps = 1
 warm_up = 1
+validation_views = 8
+calibration_views = 8
 [[crops]]
 views = 1
 crops_per_view = 1

@@ -44,9 +44,12 @@ class Area:
     test_arguments: tuple[str, ...] = ()
 
 
-# The integration tests of chaic-eval concern helpers. Tests of interruptions take most of the time of the others.
+# The integration tests of chaic-eval concern helpers. Tests of interruptions and forged runs take most of the time of the
+# others.
 UNIT_TESTS = ("--lib",)
 WITHOUT_INTERRUPTIONS = ("--", "--skip", "merging", "--skip", "starting")
+# Slow tests of planners, starts of episodes and scores, which do not concern observations.
+WITHOUT_SCORES = ("--skip", "forging", "--skip", "forecast", "--skip", "openings", "--skip", "helpers::")
 AREAS = {
     "world": Area(
         ("crates/sim/chaic-world/src/**",),
@@ -67,6 +70,8 @@ AREAS = {
     "grants": Area(
         ("crates/agents/chaic-env/src/observer.rs", "crates/agents/chaic-env/src/track.rs"),
         ("chaic-env", "chaic-eval"),
+        (),
+        (*WITHOUT_INTERRUPTIONS, *WITHOUT_SCORES),
     ),
 }
 

@@ -7,9 +7,9 @@ import { PlaybackClock } from "./clock.js";
 import { controls } from "./controls.js";
 import { doneAt, firstDifference, progressPath } from "./difference.js";
 import { clock } from "./frames.js";
-import type { DecisionLine, FrameState, Picture, ReplayInfo } from "./messages.js";
+import type { DecisionLine, FrameState, ReplayInfo } from "./messages.js";
 import { drawnSize, MAX_PX, paint, paintMap } from "./pictures.js";
-import { ReplayPlayer, type Source } from "./player.js";
+import { ReplayPlayer, type DrawnFrame, type Source } from "./player.js";
 import { styles } from "./styles.js";
 import { timeline } from "./timeline.js";
 import { WidthObserver } from "./width.js";
@@ -93,7 +93,7 @@ export class ChaicCompare extends LitElement {
       memories: [],
       withLimits: false,
     });
-    const drawn = ({ state: shown, views, map }: { state: FrameState; views: Picture[]; map: Picture | null }) => {
+    const drawn = ({ state: shown, views, map }: DrawnFrame) => {
       this.shown = replaced(this.shown, run, shown);
       if (views[0]) paint(this.viewCanvases[run], views[0]);
       if (map) paintMap(this.mapCanvas, map);

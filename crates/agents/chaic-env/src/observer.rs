@@ -276,3 +276,6 @@ fn strip(images: &mut Images, sensors: SensorConfig, may_have_ids: bool) -> Opti
     }
     if sensors.ids && may_have_ids { None } else { images.ids.take() }
 }
+
+#[cfg(test)]
+mod tests;

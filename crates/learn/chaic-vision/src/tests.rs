@@ -119,6 +119,8 @@ fn tiny() -> DetectorTrainingConfig {
     DetectorTrainingConfig {
         second_stage: RoiTrainingConfig { steps: 0, ..RoiTrainingConfig::default() },
         views: ViewConfig { size_px: 128, ..ViewConfig::TRAINING },
+        validation_views: 20,
+        calibration_views: 20,
         crops: [crops(1, 96), crops(2, 64)],
         warm_up: 2,
         learning_rate: 5e-3,

@@ -227,8 +227,20 @@ fn find_name_problem(name: &str) -> Option<String> {
 /// Name of positions outside all fields in messages.
 const TOP_LEVEL: &str = "top level";
 
-fn field_name(path: &serde_path_to_error::Path) -> String {
-    if path.iter().next().is_none() { TOP_LEVEL.to_owned() } else { path.to_string() }
+/// Parses the JSON; an error comes with the name of the field.
+#[cfg(feature = "error-paths")]
+fn parse_json(bytes: &[u8]) -> Result<EpisodeFile, (String, serde_json::Error)> {
+    let mut json = serde_json::Deserializer::from_slice(bytes);
+    serde_path_to_error::deserialize(&mut json).map_err(|e| {
+        let is_top_level = e.path().iter().next().is_none();
+        let field = if is_top_level { TOP_LEVEL.to_owned() } else { e.path().to_string() };
+        (field, e.into_inner())
+    })
+}
+
+#[cfg(not(feature = "error-paths"))]
+fn parse_json(bytes: &[u8]) -> Result<EpisodeFile, (String, serde_json::Error)> {
+    serde_json::from_slice(bytes).map_err(|e| (TOP_LEVEL.to_owned(), e))
 }
 
 /// Parses the file content if format, version and all fields are valid.
@@ -240,11 +252,7 @@ fn read(bytes: &[u8], source_name: &str) -> Result<EpisodeFile, EpisodeError> {
     }
     // Some editors put a byte order mark first.
     let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
-    let whole = || -> Result<EpisodeFile, serde_path_to_error::Error<serde_json::Error>> {
-        let mut json = serde_json::Deserializer::from_slice(bytes);
-        serde_path_to_error::deserialize(&mut json)
-    };
-    let field_of = || whole().err().map_or(TOP_LEVEL.to_owned(), |e| field_name(e.path()));
+    let field_of = || parse_json(bytes).err().map_or(TOP_LEVEL.to_owned(), |(field, _)| field);
     let syntax = |e: serde_json::Error| EpisodeError::from_syntax(source_name, &e, field_of);
     // The first pass checks syntax only, so that a truncated file is not reported as an invalid
     // one.
@@ -259,9 +267,9 @@ fn read(bytes: &[u8], source_name: &str) -> Result<EpisodeFile, EpisodeError> {
             header.version.map_or("nothing".to_owned(), |v| error::truncated(&v.to_string()));
         return Err(EpisodeError::WrongVersion { source_name: source(), found, expected: VERSION });
     }
-    whole().map_err(|e| {
-        let field = field_name(e.path());
-        EpisodeError::Field { source_name: source(), field, problem: e.into_inner().to_string() }
+    parse_json(bytes).map_err(|(field, problem)| {
+        let problem = problem.to_string();
+        EpisodeError::Field { source_name: source(), field, problem }
     })
 }
 

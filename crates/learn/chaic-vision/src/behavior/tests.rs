@@ -63,8 +63,8 @@ fn a_crop_has_the_same_scale_at_any_distance() {
 
 fn small_collection() -> ClipCollectionConfig {
     ClipCollectionConfig {
-        max_per_class: 6,
-        episodes: 6,
+        max_per_class: 4,
+        episodes: 3,
         varied_fraction: 0.0,
         ..ClipCollectionConfig::default()
     }

@@ -2,17 +2,32 @@
 
 use std::path::PathBuf;
 
+use chaic_core::AgentId;
+use chaic_env::trace::Header;
+
 use super::*;
 
 /// Plays one short episode with the turner; returns the run, its trace and its folder.
 fn played_once(helpers: &TestHelpers) -> (Run, PathBuf, tempfile::TempDir) {
+    played_with(helpers, None)
+}
+
+/// Plays it with a partner of this name.
+fn played_with(helpers: &TestHelpers, partner: Option<&str>) -> (Run, PathBuf, tempfile::TempDir) {
     let files = episode_files(&[TaskId::LowTarget], 1);
     let dir = tempfile::tempdir().unwrap();
-    let request = RunRequest { seeds: None, ..request(&files, &["turner"]) };
+    let partner = partner.map(str::to_owned);
+    let request = RunRequest { seeds: None, partner, ..request(&files, &["turner"]) };
     let (mut run, _) = Run::open(dir.path(), FolderMode::New, &request, helpers).unwrap();
     assert!(play(&mut run, 1, helpers));
     let path = run.folder().traces().unwrap().remove(0);
     (run, path, dir)
+}
+
+/// Verifies a run and returns the mismatches.
+fn verified(run: &Run, helpers: &TestHelpers) -> Vec<String> {
+    let report = crate::verify::verify_run(run.folder(), run.options(), helpers, 1, &|_| ());
+    report.unwrap().mismatches.iter().map(ToString::to_string).collect()
 }
 
 #[test]
@@ -78,6 +93,59 @@ fn an_unknown_helper_is_checked_against_the_grants_of_the_run() {
         mismatches[0].problem.contains("differs from the one that this run writes: people"),
         "{mismatches:?}"
     );
+}
+
+#[test]
+fn the_partner_of_the_run_is_expected_in_traces() {
+    let helpers = TestHelpers::new();
+    let (run, path, _dir) = played_with(&helpers, Some("slow"));
+    assert_eq!(verified(&run, &helpers), [""; 0]);
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, text.replacen("\"slow\"", "\"fast\"", 1)).unwrap();
+    assert!(verified(&run, &helpers)[0].contains("differs from the one that this run writes"));
+}
+
+#[test]
+fn weights_that_agents_lack_are_no_part_of_traces() {
+    let helpers = TestHelpers::new();
+    let (run, path, dir) = played_once(&helpers);
+    let text = fs::read_to_string(&path).unwrap();
+    let (first, rest) = text.split_once('\n').unwrap();
+    let message = "differs from the one that this run writes: people";
+    for agent in [AgentId::PARTNER, AgentId::HELPER] {
+        let mut header: Header = serde_json::from_str(first).unwrap();
+        header.people[agent.index()].weights = Some("0123456789abcdef".to_owned());
+        let forged = serde_json::to_string(&header).unwrap();
+        fs::write(&path, format!("{forged}\n{rest}")).unwrap();
+        let problems = verified(&run, &helpers);
+        assert!(problems.len() == 1 && problems[0].contains(message), "{agent}: {problems:?}");
+    }
+    // Nor if run.json names them as well.
+    let run_file = dir.path().join("run.json");
+    let mut forged: serde_json::Value =
+        serde_json::from_slice(&fs::read(&run_file).unwrap()).unwrap();
+    forged["granted"]["weights"] = serde_json::json!({ "turner": "0123456789abcdef" });
+    fs::write(&run_file, forged.to_string()).unwrap();
+    let (folder, options) = RunFolder::read(dir.path()).unwrap();
+    let report = crate::verify::verify_run(&folder, &options, &helpers, 1, &|_| ());
+    let problems = report.map_or_else(|e| e.to_string(), |r| format!("{:?}", r.mismatches));
+    assert!(problems.contains(message), "{problems}");
+}
+
+#[test]
+fn the_first_line_in_another_form_is_named() {
+    let helpers = TestHelpers::new();
+    let (run, path, _dir) = played_once(&helpers);
+    let text = fs::read_to_string(&path).unwrap();
+    let n_lines = text.lines().count();
+    for (changed, message) in [
+        (text.trim_end().to_owned() + " \n", format!("line {n_lines} differs from the form")),
+        (text.clone() + "\n", format!("line {} follows the end", n_lines + 1)),
+    ] {
+        fs::write(&path, changed).unwrap();
+        let problems = verified(&run, &helpers);
+        assert!(problems.len() == 1 && problems[0].contains(&message), "{problems:?}");
+    }
 }
 
 #[test]

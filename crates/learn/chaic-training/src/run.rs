@@ -208,6 +208,7 @@ impl<T: Trainer> TrainingRun<T> {
                     trainer
                         .load_parameters(read_weights::<T>(&config, &initial, bytes)?.parameters);
                 }
+                write_initial_checkpoint(&trainer, folder)?;
             }
         }
         let phase = if validation_is_due { Phase::Train } else { Phase::Validation };
@@ -364,11 +365,19 @@ fn start_locked<T: Trainer>(
     if let Some(weights) = weights {
         trainer.load_parameters(weights.parameters);
     }
-    let checkpoint_error =
-        |problem| TrainingError::Checkpoint { path: folder.join(CHECKPOINT), problem };
-    let bytes = checkpoint_bytes(&trainer, &[]).map_err(checkpoint_error)?;
-    write_atomically(&folder.join(CHECKPOINT), &bytes)?;
+    write_initial_checkpoint(&trainer, folder)?;
     Ok(Some(trainer))
+}
+
+/// Writes the checkpoint of a training before its first step. Curves without a checkpoint mean that it
+/// is lost.
+fn write_initial_checkpoint<T: Trainer>(trainer: &T, folder: &Path) -> Result<(), TrainingError> {
+    let path = folder.join(CHECKPOINT);
+    let bytes = match checkpoint_bytes(trainer, &[]) {
+        Ok(bytes) => bytes,
+        Err(problem) => return Err(TrainingError::Checkpoint { path, problem }),
+    };
+    Ok(write_atomically(&path, &bytes)?)
 }
 
 /// Refuses a folder with more than the leftovers of a training that was killed before it started.

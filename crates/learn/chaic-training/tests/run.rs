@@ -244,6 +244,24 @@ fn a_training_that_is_killed_anywhere_ends_with_the_same_files() {
 }
 
 #[test]
+fn a_training_that_is_killed_twice_before_its_second_checkpoint_is_resumed() {
+    let dir = tempfile::tempdir().unwrap();
+    let [whole, killed, again] = ["whole", "killed", "again"].map(|name| dir.path().join(name));
+    assert!(run_to_end(&mut start(&whole, &ToyConfig::default()), &mut |_, _| ()));
+    // Killed when it had written its configuration alone.
+    drop(start(&killed, &ToyConfig::default()));
+    fs::remove_file(killed.join(CHECKPOINT)).unwrap();
+    assert!(run_to_end(&mut resume(&killed).unwrap(), &mut |record, _| {
+        if !again.exists() {
+            assert!(record.step < 5, "before the second checkpoint");
+            copy(&killed, &again);
+        }
+    }));
+    assert!(run_to_end(&mut resume(&again).unwrap(), &mut |_, _| ()));
+    assert!(final_files(&again) == final_files(&whole));
+}
+
+#[test]
 fn a_training_that_is_stopped_anywhere_ends_with_the_same_files() {
     let dir = tempfile::tempdir().unwrap();
     let uninterrupted = dir.path().join("whole");

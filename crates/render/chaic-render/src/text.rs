@@ -89,6 +89,8 @@ pub(crate) fn draw_label(image: &mut RgbImage, label: &TextLabel) {
 
 #[cfg(test)]
 mod tests {
+    use chaic_core::Vec2;
+
     use super::*;
 
     #[test]
@@ -101,5 +103,17 @@ mod tests {
         assert!(width("ww", 20.0) > width("w", 20.0));
         let (text, size_px) = ("wanted: 2 apple", 17.0);
         assert!((width(text, size_px) - TextLabel::width_px(text, size_px)).abs() < 0.01);
+        let label = TextLabel {
+            text: text.to_owned(),
+            top: Vec2::new(1.0, 2.0),
+            size_px,
+            align: Align::Left,
+            color: [0; 3],
+            border: None,
+        };
+        let font = FONT.as_scaled(PxScale::from(size_px));
+        assert!(label.baseline().distance(Vec2::new(1.0, 2.0 + font.ascent())) < 0.01);
+        let em_px = FONT.units_per_em().unwrap() / FONT.height_unscaled() * size_px;
+        assert!((label.em_px() - em_px).abs() < 0.01);
     }
 }

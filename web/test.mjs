@@ -43,10 +43,12 @@ async function open(file, hash = "", options = {}) {
   return { page, requests };
 }
 
+/** Waits until a replay is verified and a frame of it is drawn. */
 const shown = (page) =>
-  page.waitForFunction(() =>
-    document.querySelector("#player > *")?.shadowRoot.querySelector("figcaption b"),
-  );
+  page.waitForFunction(() => {
+    const content = document.querySelector("#player > *")?.shadowRoot;
+    return content?.querySelector("figcaption b") && content.querySelector(".controls");
+  });
 
 /** Waits until a frame is drawn, and returns a digest of the pixels of all canvases. */
 async function pictures(page, frame) {

@@ -28,6 +28,7 @@ declare module "*/chaic_web.js" {
 
   export class Player {
     constructor(trace: Uint8Array, episode: Uint8Array);
+    verify(frames: number): boolean;
     info(): string;
     seek(frame: number): string;
     view(agent: number, side: number): Picture;

@@ -80,7 +80,8 @@ export class ChaicCompare extends LitElement {
   }
 
   private open(run: number, source: Source): void {
-    const opened = (info: ReplayInfo): void => {
+    const informed = (info: ReplayInfo): void => {
+      if (!info.is_complete) return;
       this.infos = replaced(this.infos, run, info);
       const [a, b] = this.infos;
       if (a && b) this.begin(a, b);
@@ -101,7 +102,7 @@ export class ChaicCompare extends LitElement {
     const failed = (message: string): void => {
       this.problem = message;
     };
-    this.players[run] = new ReplayPlayer(this.workerSource, source, wanted, opened, drawn, failed);
+    this.players[run] = new ReplayPlayer(this.workerSource, source, wanted, informed, drawn, failed);
   }
 
   private begin(a: ReplayInfo, b: ReplayInfo): void {

@@ -41,7 +41,7 @@ export interface DecisionLine {
   text: string;
 }
 
-/** Facts about a replay that do not change. */
+/** Facts about a replay, as far as it is re-simulated. */
 export interface ReplayInfo {
   task: string;
   episode: string;
@@ -50,6 +50,8 @@ export interface ReplayInfo {
   chaic: string;
   agents: AgentInfo[];
   goal: string[];
+  /** True if the re-simulation has ended. */
+  is_complete: boolean;
   last_frame: number;
   length: number;
   frames_per_second: number;
@@ -245,6 +247,7 @@ export interface Branch {
 /** Message of the worker. */
 export type Response =
   | { type: "opened"; info: ReplayInfo }
+  | { type: "verified"; info: ReplayInfo }
   | { type: "frame"; state: FrameState; views: Picture[]; map: MapPicture | null; layers: LayerData }
   | { type: "rerun"; state: RerunState }
   | { type: "playing"; info: LiveInfo }

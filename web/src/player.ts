@@ -36,14 +36,14 @@ export class ReplayPlayer {
   private onRerun?: (state: RerunState) => void;
 
   /**
-   * Opens a replay. `wanted` returns what is drawn next. `onOpened` and `onFrame` receive the results, `onError` the reason if the replay cannot
-   * be shown.
+   * Opens a replay. `wanted` returns what is drawn next. `onInfo` receives the facts twice: when the first frame can be drawn, and when the
+   * whole replay is verified. `onFrame` receives frames, `onError` the reason if the replay cannot be shown.
    */
   constructor(
     workerSource: string,
     source: Source,
     private readonly wanted: () => Wanted,
-    private readonly onOpened: (info: ReplayInfo) => void,
+    private readonly onInfo: (info: ReplayInfo) => void,
     private readonly onFrame: (frame: DrawnFrame) => void,
     private readonly onError: (message: string) => void,
   ) {
@@ -96,10 +96,14 @@ export class ReplayPlayer {
       this.onRerun?.(response.state);
       return;
     }
+    if (response.type === "verified") {
+      this.onInfo(response.info);
+      return;
+    }
     this.isBusy = false;
     if (response.type === "opened") {
       this.isOpen = true;
-      this.onOpened(response.info);
+      this.onInfo(response.info);
     } else if (response.type === "frame") {
       this.onFrame(response);
     } else if (response.type === "error") {

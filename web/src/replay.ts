@@ -76,17 +76,20 @@ export class ChaicReplay extends LitElement {
     this.isRerunning = false;
     this.layers.reset();
     this.playback.reset();
-    const opened = (info: ReplayInfo): void => {
+    const informed = (info: ReplayInfo): void => {
       this.info = info;
+      // The size of the pictures is known after the layout.
+      if (!info.is_complete) {
+        void this.updateComplete.then(() => this.player?.seek(0));
+        return;
+      }
       this.problem = info.problem ?? undefined;
       const events = info.timeline.story.map((line) => line.frame);
       this.playback.reset({ last: info.last_frame, perSecond: info.frames_per_second, events });
-      // The size of the pictures is known after the layout.
       void this.updateComplete.then(() => {
         this.seek(this.start);
         this.chooseLayers();
       });
-      this.dispatchEvent(new CustomEvent("opened", { detail: info }));
     };
     const failed = (message: string): void => {
       this.problem = message;
@@ -99,7 +102,7 @@ export class ChaicReplay extends LitElement {
       memories: this.layers.memories,
       withLimits: this.layers.withLimits,
     });
-    this.player = new ReplayPlayer(this.workerSource, source, wanted, opened, drawn, failed);
+    this.player = new ReplayPlayer(this.workerSource, source, wanted, informed, drawn, failed);
   }
 
   private moved(frame: number): void {
@@ -133,11 +136,16 @@ export class ChaicReplay extends LitElement {
     }
     return html`<section aria-label="Replay" @keydown=${(event: KeyboardEvent) => this.playback.press(event)}>
       ${this.heading(info)} ${this.pictures(info)}
-      ${controls(this.playback, info.last_frame, info.frames_per_second, this.status(info))}
+      ${info.is_complete ? this.details(info) : html`<p role="status">Verifying ...</p>`}
+    </section>`;
+  }
+
+  /** What the whole replay must be known for. */
+  private details(info: ReplayInfo): TemplateResult {
+    return html`${controls(this.playback, info.last_frame, info.frames_per_second, this.status(info))}
       ${this.layers.choice(info)} ${this.layers.words(info)}
       ${timeline(info, this.frame, (frame) => this.seek(frame))} ${legend()} ${this.seats(info)}
-      <div class="columns">${this.story(info)} ${this.belief(this.shown?.belief)}</div>
-    </section>`;
+      <div class="columns">${this.story(info)} ${this.belief(this.shown?.belief)}</div>`;
   }
 
   private heading(info: ReplayInfo): TemplateResult {
@@ -147,8 +155,8 @@ export class ChaicReplay extends LitElement {
     return html`<header>
       <h2>${info.task}: the partner (${partner?.person ?? ""}) wants ${info.goal.join(", ")}</h2>
       <p>
-        ${helper}; ${done} of ${info.total} delivered. ${limits(info)}
-        ${badge(info)}
+        ${helper}${info.is_complete ? `; ${done} of ${info.total} delivered` : ""}. ${limits(info)}
+        ${info.is_complete ? badge(info) : nothing}
       </p>
       ${this.problem
         ? html`<p class="problem" role="alert">

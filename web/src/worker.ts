@@ -22,8 +22,10 @@ let isRerunning = false;
 /** Frames that are drawn once in advance, so that browsers optimize the module before a person seeks. */
 let warmUpFrames: number[] = [];
 
-/** Longest time for which the agents run again before the worker answers requests, milliseconds. */
+/** Longest time for which the worker re-simulates before it answers requests, milliseconds. */
 const SLICE_MS = 20;
+/** Frames that are re-simulated between two looks at the clock. */
+const VERIFIED_FRAMES = 20;
 /** Time between messages about their progress, milliseconds. */
 const PROGRESS_MS = 250;
 
@@ -43,7 +45,8 @@ function answer(request: Request): void {
     case "open":
       initSync({ module: request.module });
       player = new Player(request.trace, request.episode);
-      open(JSON.parse(player.info()));
+      send({ type: "opened", info: JSON.parse(player.info()) });
+      setTimeout(verify);
       break;
     case "frame":
       drawFrame(request);
@@ -68,9 +71,18 @@ function answer(request: Request): void {
   }
 }
 
-function open(info: ReplayInfo): void {
+/** Re-simulates the replay in slices, so that its first frame is drawn meanwhile. */
+function verify(): void {
+  if (!player) return;
+  const start = performance.now();
+  while (!player.verify(VERIFIED_FRAMES)) {
+    if (performance.now() - start < SLICE_MS) continue;
+    setTimeout(verify);
+    return;
+  }
+  const info: ReplayInfo = JSON.parse(player.info());
   warmUpFrames = [0.25, 0.5, 0.75].map((part) => Math.floor(part * info.last_frame));
-  send({ type: "opened", info });
+  send({ type: "verified", info });
 }
 
 /** Draws the next frame in advance, if no request comes first. */

@@ -15,8 +15,7 @@ pub const GT_TRACKS: &str = "gt_tracks";
 
 /// Kind of perception: its name, its required sensors and grants, and constructors of its parts.
 pub trait PerceptionFactory: Send + Sync {
-    /// Name in traces and reports, by which the same perception can be selected again; `None` for
-    /// granted ground-truth ids.
+    /// Name in traces and reports; `None` for granted ground-truth ids.
     fn name(&self) -> Option<String>;
 
     /// Sensors that the perception requires.

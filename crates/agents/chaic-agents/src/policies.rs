@@ -1,4 +1,5 @@
-//! Policies: rule-based, random, following the partner, or controlled by a caller.
+//! Policies: rule-based, inferring, random, following the partner, of partners with other habits,
+//! repeating a recording, or controlled by a caller.
 
 mod external;
 mod follow;

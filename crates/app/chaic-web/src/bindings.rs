@@ -36,7 +36,7 @@ fn json(value: &impl serde::Serialize) -> Result<String, JsError> {
 
 #[wasm_bindgen]
 impl Player {
-    /// Opens a trace of an episode and re-simulates it.
+    /// Opens a trace of an episode at its first frame.
     ///
     /// # Errors
     /// If one of them is unreadable, or they do not belong together.
@@ -45,12 +45,17 @@ impl Player {
         Ok(Player { player: ReplayPlayer::open(trace, episode).map_err(error)? })
     }
 
+    /// Re-simulates at most this many further frames; true once the re-simulation has ended.
+    pub fn verify(&mut self, n_frames: u32) -> bool {
+        self.player.verify(n_frames)
+    }
+
     /// Returns [`crate::ReplayInfo`].
     ///
     /// # Errors
     /// Never in practice.
     pub fn info(&self) -> Result<String, JsError> {
-        json(self.player.info())
+        json(&self.player.info())
     }
 
     /// Moves to a frame and returns [`crate::FrameState`].

@@ -39,7 +39,7 @@ pub enum PlayerError {
     NoAgent(AgentId),
 }
 
-/// Facts about a replay that do not change.
+/// Facts about a replay, as far as it is re-simulated.
 #[derive(Clone, Debug, Serialize)]
 pub struct ReplayInfo {
     /// Name of the task.
@@ -56,6 +56,8 @@ pub struct ReplayInfo {
     pub agents: Vec<AgentInfo>,
     /// Wanted objects, for example `3 apple`.
     pub goal: Vec<String>,
+    /// True if the re-simulation has ended.
+    pub is_complete: bool,
     /// Last frame that can be shown.
     pub last_frame: Frame,
     /// Length of the trace in frames; larger than `last_frame` if the trace is altered.
@@ -137,13 +139,19 @@ pub struct RerunState {
 
 /// Re-simulation of a trace with a movable position.
 pub struct ReplayPlayer {
-    info: ReplayInfo,
     scene: Scene,
     /// Map of the last drawn width.
     plan: Option<FloorPlan>,
     current: Playback<Arc<Trace>>,
+    /// State at the last frame that is verified.
+    verified: Playback<Arc<Trace>>,
     /// States at multiples of [`KEYFRAME_INTERVAL`].
     keyframes: Vec<Playback<Arc<Trace>>>,
+    timeline: Timeline,
+    trails: Vec<Vec<[f32; 2]>>,
+    /// Why the re-simulation stopped, or the trace is incomplete.
+    problem: Option<String>,
+    is_complete: bool,
     trace: Arc<Trace>,
     episode: Episode,
     /// Memories of the agents, once they run again.
@@ -151,8 +159,7 @@ pub struct ReplayPlayer {
 }
 
 impl ReplayPlayer {
-    /// Opens a trace (JSON lines) of an episode (JSON), and re-simulates it once. An altered trace can
-    /// be shown up to the frame that differs.
+    /// Opens a trace (JSON lines) of an episode (JSON) at its first frame.
     ///
     /// # Errors
     /// If the trace or the episode is unreadable, or they do not belong together.
@@ -160,54 +167,112 @@ impl ReplayPlayer {
         let (trace, warnings) = parse(trace, Path::new("trace"))?;
         let episode = Episode::parse(episode, "episode")?;
         let trace = Arc::new(trace);
-        let mut playback = Playback::new(Arc::clone(&trace), &episode)?;
-        let scene = Scene::with_appearance(playback.world().setup(), trace.header.appearance);
-        let (mut keyframes, mut timeline) = (vec![playback.clone()], Timeline::default());
-        let mut trails = vec![Vec::new(); playback.world().state().agents.len()];
-        add_positions(&mut trails, playback.world());
-        let mut problem = warnings.first().map(ToString::to_string);
-        loop {
-            match playback.step() {
-                Ok(Some(events)) => timeline.add(playback.world(), &events),
-                Ok(None) => break,
-                Err(error) => {
-                    problem = Some(error.to_string());
-                    break;
-                }
-            }
-            let frame = playback.world().state().frame;
-            if frame.is_multiple_of(KEYFRAME_INTERVAL) {
-                keyframes.push(playback.clone());
-            }
-            if frame.is_multiple_of(TRAIL_INTERVAL) {
-                add_positions(&mut trails, playback.world());
-            }
-        }
-        let info = ReplayInfo::new(&playback, &trace, problem, timeline, trails);
-        let current = keyframes[0].clone();
+        let start = Playback::new(Arc::clone(&trace), &episode)?;
+        let world = start.world();
+        let scene = Scene::with_appearance(world.setup(), trace.header.appearance);
+        let mut trails = vec![Vec::new(); world.state().agents.len()];
+        add_positions(&mut trails, world);
         Ok(ReplayPlayer {
-            info,
             scene,
             plan: None,
-            current,
-            keyframes,
+            current: start.clone(),
+            keyframes: vec![start.clone()],
+            verified: start,
+            timeline: Timeline::default(),
+            trails,
+            problem: warnings.first().map(ToString::to_string),
+            is_complete: false,
             trace,
             episode,
             memories: None,
         })
     }
 
-    /// Returns the facts that do not change.
-    pub fn info(&self) -> &ReplayInfo {
-        &self.info
+    /// Re-simulates the trace from the last verified frame, for at most `n_frames`. Returns true once
+    /// the re-simulation has ended: with the trace, or before the frame in which an altered trace
+    /// differs. Only verified frames can be shown.
+    pub fn verify(&mut self, n_frames: Frame) -> bool {
+        for _ in 0..n_frames {
+            if self.is_complete {
+                break;
+            }
+            self.verify_next();
+        }
+        self.is_complete
     }
 
-    /// Moves to a frame, at most the last one.
+    fn verify_next(&mut self) {
+        match self.verified.step() {
+            Ok(Some(events)) => self.timeline.add(self.verified.world(), &events),
+            end => {
+                self.is_complete = true;
+                if let Err(error) = end {
+                    self.problem = Some(error.to_string());
+                }
+                return;
+            }
+        }
+        let frame = self.verified.world().state().frame;
+        if frame.is_multiple_of(KEYFRAME_INTERVAL) {
+            self.keyframes.push(self.verified.clone());
+        }
+        if frame.is_multiple_of(TRAIL_INTERVAL) {
+            add_positions(&mut self.trails, self.verified.world());
+        }
+    }
+
+    /// Describes the replay up to the last verified frame.
+    pub fn info(&self) -> ReplayInfo {
+        let (header, world) = (self.verified.header(), self.verified.world());
+        let setup = world.setup();
+        let agent = |(id, person): (AgentId, &chaic_world::AgentSpec)| {
+            let capability = person.capability();
+            AgentInfo {
+                id,
+                name: id.to_string(),
+                person: person.kind().to_string(),
+                reach_m: capability.pick_range_m,
+                strength_kg: capability.strength_kg,
+            }
+        };
+        let decision = |decision: &Decision| DecisionLine {
+            frame: decision.frame,
+            agent: decision.agent,
+            text: action_text(setup, &decision.action),
+        };
+        let decisions: Vec<DecisionLine> = self.trace.decisions().map(decision).collect();
+        let goal =
+            setup.goal.targets.iter().map(|(class, n)| format!("{n} {}", class.info().label));
+        ReplayInfo {
+            task: header.task.info().title,
+            episode: header.episode.clone(),
+            helper: header.helper.clone(),
+            seed: header.seed,
+            chaic: header.chaic.clone(),
+            agents: setup.agents().zip(&setup.people).map(agent).collect(),
+            goal: goal.collect(),
+            is_complete: self.is_complete,
+            last_frame: world.state().frame,
+            length: self.verified.last_frame(),
+            frames_per_second: FRAMES_PER_SECOND,
+            total: world.progress().1,
+            n_verified: self.verified.n_decisions(),
+            n_decisions: decisions.len(),
+            problem: self.problem.clone(),
+            timeline: self.timeline.clone(),
+            decisions,
+            map_height: floor_plan::relative_height(world),
+            trail_interval: TRAIL_INTERVAL,
+            trails: self.trails.clone(),
+        }
+    }
+
+    /// Moves to a frame, at most the last verified one.
     ///
     /// # Errors
-    /// Never after [`ReplayPlayer::open`] has verified the frames.
+    /// Never, since the frames are verified.
     pub fn seek(&mut self, frame: Frame) -> Result<(), PlayerError> {
-        let frame = frame.min(self.info.last_frame);
+        let frame = frame.min(self.verified.world().state().frame);
         let now = self.current.world().state().frame;
         let keyframe = (frame / KEYFRAME_INTERVAL) as usize;
         if frame < now || frame / KEYFRAME_INTERVAL > now / KEYFRAME_INTERVAL {
@@ -300,59 +365,6 @@ impl ReplayPlayer {
         DrawnMap {
             image: DrawnImage::from_rgb(map.width(), map.height(), map.as_raw()),
             labels: labels.iter().map(CanvasLabel::new).collect(),
-        }
-    }
-}
-
-impl ReplayInfo {
-    /// Describes a replay, with a playback at the last frame that can be shown.
-    fn new(
-        playback: &Playback<Arc<Trace>>,
-        trace: &Trace,
-        problem: Option<String>,
-        timeline: Timeline,
-        trails: Vec<Vec<[f32; 2]>>,
-    ) -> ReplayInfo {
-        let (header, world) = (playback.header(), playback.world());
-        let setup = world.setup();
-        let agent = |(id, person): (AgentId, &chaic_world::AgentSpec)| {
-            let capability = person.capability();
-            AgentInfo {
-                id,
-                name: id.to_string(),
-                person: person.kind().to_string(),
-                reach_m: capability.pick_range_m,
-                strength_kg: capability.strength_kg,
-            }
-        };
-        let decision = |decision: &Decision| DecisionLine {
-            frame: decision.frame,
-            agent: decision.agent,
-            text: action_text(setup, &decision.action),
-        };
-        let decisions: Vec<DecisionLine> = trace.decisions().map(decision).collect();
-        let goal =
-            setup.goal.targets.iter().map(|(class, n)| format!("{n} {}", class.info().label));
-        ReplayInfo {
-            task: header.task.info().title,
-            episode: header.episode.clone(),
-            helper: header.helper.clone(),
-            seed: header.seed,
-            chaic: header.chaic.clone(),
-            agents: setup.agents().zip(&setup.people).map(agent).collect(),
-            goal: goal.collect(),
-            last_frame: world.state().frame,
-            length: playback.last_frame(),
-            frames_per_second: FRAMES_PER_SECOND,
-            total: world.progress().1,
-            n_verified: playback.n_decisions(),
-            n_decisions: decisions.len(),
-            problem,
-            timeline,
-            decisions,
-            map_height: floor_plan::relative_height(world),
-            trail_interval: TRAIL_INTERVAL,
-            trails,
         }
     }
 }

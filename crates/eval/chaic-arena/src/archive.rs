@@ -45,7 +45,7 @@ pub fn extract(archive: &Path, target: &Path) -> Result<()> {
         let error = io::Error::from(io::ErrorKind::AlreadyExists);
         return Err(FileError::context("extract into", target)(error).into());
     }
-    Scan::open(archive)?.run(&mut Nowhere)?;
+    Scan::open(archive)?.run(&mut NullDestination)?;
     let parent = match target.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
@@ -64,9 +64,9 @@ pub fn extract(archive: &Path, target: &Path) -> Result<()> {
 }
 
 /// Destination that discards all content.
-struct Nowhere;
+struct NullDestination;
 
-impl Destination for Nowhere {
+impl Destination for NullDestination {
     fn folder(&mut self, _: &str) -> Result<()> {
         Ok(())
     }

@@ -151,10 +151,13 @@ impl PlayedRun {
         let (mut results, warnings) = read_results(&folder.results(), &planned)?;
         let n_missing = planned.len().saturating_sub(results.len());
         if n_missing > 0 || !warnings.is_empty() {
-            let problem = format!(
-                "{n_missing} of {} episode runs are missing; repeat `chaic submit run` to play them",
-                planned.len()
-            );
+            let problem = match (n_missing, warnings.first()) {
+                (0, Some(warning)) => format!("{warning}; repeat `chaic submit run`"),
+                _ => format!(
+                    "{n_missing} of {} episode runs are missing; repeat `chaic submit run` to play them",
+                    planned.len()
+                ),
+            };
             return Err(ArenaError::Score { path: path.to_owned(), problem });
         }
         results.sort_by(|a, b| a.key.cmp(&b.key));

@@ -20,7 +20,7 @@ const MAX_BYTES: u64 = 256 << 20;
 
 /// Result of a deletion.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Deleted {
+pub struct DeletionReport {
     /// Removed files.
     pub files: Vec<PathBuf>,
     /// Number of rows that were removed from tables.
@@ -35,11 +35,11 @@ pub struct Deleted {
 ///
 /// # Errors
 /// If the text is no code, or the file system refuses. Repeat the deletion then.
-pub fn delete(code: &str, folder: &Path) -> Result<Deleted> {
+pub fn delete(code: &str, folder: &Path) -> Result<DeletionReport> {
     if !is_code(code) {
         return Err(StudyError::Code(code.to_owned()));
     }
-    let mut deleted = Deleted::default();
+    let mut deleted = DeletionReport::default();
     // A folder that does not exist is a mistake, not a success.
     fs::metadata(folder).map_err(FileError::context("open", folder))?;
     for entry in walk(folder, DEPTH)? {

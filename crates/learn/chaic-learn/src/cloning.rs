@@ -101,7 +101,7 @@ impl ExpertPolicy {
     }
 
     /// Returns the briefing of the expert, if it differs from that of the learner.
-    fn told(&self, briefing: &Briefing) -> Option<Briefing> {
+    fn expert_briefing(&self, briefing: &Briefing) -> Option<Briefing> {
         let goal = self.goal.clone()?;
         Some(Briefing { goal: Some(goal), ..briefing.clone() })
     }
@@ -109,8 +109,8 @@ impl ExpertPolicy {
 
 impl Policy for ExpertPolicy {
     fn reset(&mut self, briefing: &Briefing) {
-        let told = self.told(briefing);
-        self.expert.reset(told.as_ref().unwrap_or(briefing));
+        let granted = self.expert_briefing(briefing);
+        self.expert.reset(granted.as_ref().unwrap_or(briefing));
         match &mut self.actor {
             RolloutActor::Expert(features) => features.reset(briefing),
             RolloutActor::Learner(learner) => learner.reset(briefing),
@@ -123,8 +123,8 @@ impl Policy for ExpertPolicy {
         let candidates = features.history.candidates(valid);
         // A single candidate is no decision.
         let decision = (candidates.len() > 1).then(|| features.encode(context, valid, &candidates));
-        let told = self.told(context.briefing);
-        let briefing = told.as_ref().unwrap_or(context.briefing);
+        let granted = self.expert_briefing(context.briefing);
+        let briefing = granted.as_ref().unwrap_or(context.briefing);
         let expert_plan = self.expert.choose(&Context { briefing, ..*context }, valid)?;
         // If the expert's plan does not replace the current one, the label is to continue.
         let continues =
@@ -151,11 +151,11 @@ impl Policy for ExpertPolicy {
     }
 
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, has_changed: bool) -> bool {
-        let told = self.told(context.briefing);
+        let granted = self.expert_briefing(context.briefing);
         match &mut self.actor {
             RolloutActor::Learner(learner) => learner.reconsiders(context, current, has_changed),
             RolloutActor::Expert(features) => {
-                let briefing = told.as_ref().unwrap_or(context.briefing);
+                let briefing = granted.as_ref().unwrap_or(context.briefing);
                 let context = Context { briefing, ..*context };
                 let is_due = self.expert.reconsiders(&context, current, has_changed);
                 features.history.set_reconsidered(is_due.then_some(*current));

@@ -35,9 +35,9 @@ fn path(folder: &Path, iteration: u64) -> PathBuf {
 }
 
 impl Demonstrations {
-    /// Reads those of the iterations before `iterations` that [`Demonstrations::write`] wrote; of
-    /// the last `max_episodes` episodes. `n_features` are the numbers of features of a state and of a
-    /// plan.
+    /// Reads the files of iterations 0 to `iterations` - 1 ([`Demonstrations::write`]), newest first,
+    /// until `max_episodes` episodes are read. `n_features` are the numbers of features of a state and
+    /// of a plan.
     ///
     /// # Errors
     /// One line, if a file cannot be read, is damaged, or belongs to another training.

@@ -2,8 +2,8 @@
 //! From a helper's last five observations it predicts the partner's goal and physical limits.
 //!
 //! [`window`] encodes the input, [`network`] has the model, [`tracker`] runs it during an episode,
-//! [`collect`] collects labeled windows
-//! from generated episodes, and [`train`] and [`report`] train and evaluate the model.
+//! [`collect`] collects labeled windows from generated episodes, and [`train`] and [`report`] train
+//! and evaluate the model.
 
 pub mod window;
 

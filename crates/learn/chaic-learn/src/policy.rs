@@ -21,8 +21,8 @@ use crate::features::FeatureEncoder;
 use crate::plan_history::may_replace;
 use crate::policy_kind::PolicyWeights;
 
-/// Creates a helper with this policy and these grants, as far as the perception needs them. It observes its partner through its perception, and explores as the helper
-/// that infers.
+/// Creates a helper with this policy, and with those of these grants that the perception keeps. The
+/// helper observes the partner through the perception, and explores like `infer`.
 pub fn policy_helper<P: Policy>(
     policy: P,
     rules: PlannerRules,

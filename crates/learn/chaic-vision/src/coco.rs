@@ -116,7 +116,7 @@ struct Annotation {
     iscrowd: u8,
 }
 
-/// ImageRecord of a COCO results file.
+/// Entry of a COCO results file.
 #[derive(Clone, Debug, Serialize)]
 pub struct CocoResult {
     image_id: usize,

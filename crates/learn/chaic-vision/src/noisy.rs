@@ -28,7 +28,8 @@ pub struct DetectorNoiseModel {
     /// are always missed. Areas in smaller images are scaled to 512x512.
     #[serde(alias = "missed")]
     pub miss_rate_by_area: Vec<(u32, f32)>,
-    /// Fraction of detected objects with the label of another class of the same role.
+    /// Fraction of detected objects with the label of a random class of the same role, which may be
+    /// their own.
     #[serde(alias = "misnamed")]
     pub misclassification_rate: f32,
     /// Mean number of false positives per image.

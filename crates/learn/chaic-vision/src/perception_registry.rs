@@ -150,7 +150,7 @@ fn factory_from_name(name: &str) -> Result<Arc<dyn PerceptionFactory>, Perceptio
         )));
     }
     Err(PerceptionError::Unknown(format!(
-        "no perception `{name}`; write {GROUND_TRUTH}, {GT_TRACKS}, {GT_MASKS}, {GT_NAMES}, {LEARNED}, \
-         {LEARNED}:FILE, {NOISY} or {NOISY}:FILE"
+        "no perception `{name}`; write {GROUND_TRUTH}, {GT_TRACKS}, {GT_MASKS}, {GT_NAMES}, \
+         {GT_NAMES}:FILE, {LEARNED}, {LEARNED}:FILE, {NOISY} or {NOISY}:FILE"
     )))
 }

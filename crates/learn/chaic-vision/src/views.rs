@@ -487,7 +487,7 @@ fn objects_with_roles(scene: &ViewScene, roles: &[Role]) -> Vec<usize> {
     (0..things.len()).filter(|k| has_role(&things[*k])).collect()
 }
 
-/// Draws an object, uniformly over the visible classes: of the movable ones, or of all others,
+/// Draws an object, uniformly over the classes in the scene: of the movable ones, or of all others,
 /// which include people.
 fn random_object(scene: &ViewScene, is_movable: bool, rng: &mut RngStream) -> Option<EntityId> {
     let is_candidate =
@@ -542,7 +542,8 @@ fn target_position(scene: &ViewScene, entity: EntityId) -> Vec3 {
     }
 }
 
-/// Returns the distance at which an object covers about 100 pixels of a 512x512 image, meters.
+/// Returns the distance at which an object covers about 41 pixels of a 512x512 image, meters: the
+/// focal length is 256 pixels, and (256 / 40)² = 41.
 fn max_visible_distance_m(scene: &ViewScene, entity: EntityId) -> f32 {
     let class = scene.labels.get(usize::from(entity.0)).and_then(|label| class_of(*label));
     let mut size_m = class.map_or([1.0; 3], |class| class.info().size_m);

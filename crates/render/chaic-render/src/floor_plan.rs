@@ -262,8 +262,8 @@ fn room_labels(world: &World, map: &Map, width_px: u32) -> Vec<TextLabel> {
     let label = |room: &Room| {
         let (a, b) = (map.px_from_xz(room.rect.min), map.px_from_xz(room.rect.max));
         let name = room_name(room.kind);
-        let fits = (b.x - a.x) / TextLabel::width_px(name, 4.0).max(4.0) * 0.8;
-        let size_px = (0.022 * width_px as f32).min(fits).clamp(9.0, 26.0);
+        let fitting_px = 0.8 * (b.x - a.x) / TextLabel::width_px(name, 1.0).max(1.0);
+        let size_px = (0.022 * width_px as f32).min(fitting_px).clamp(9.0, 26.0);
         let is_too_wide = TextLabel::width_px(name, size_px) > (b.x - a.x).max(20.0);
         if is_too_wide || (b.y - a.y) < size_px {
             return None;

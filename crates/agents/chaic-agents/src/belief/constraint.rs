@@ -11,9 +11,9 @@ use super::{normalized, posterior};
 
 /// Chance of a failure within all limits, for example by a tremor.
 const UNEXPLAINED_FAILURE: f32 = 0.02;
-/// Chance of an attempt that was recognized wrongly. It is the same for all people, so such an
-/// attempt carries no information.
-const UNINFORMED: f32 = 0.5;
+/// Likelihood of an observed failure if the attempt was recognized wrongly. It is the same for all
+/// people, so such an attempt carries no information.
+const MISRECOGNIZED_FAILURE: f32 = 0.5;
 
 /// Distance from the height within which the top of a fully visible body is equally likely, meters.
 const TOP_TOLERANCE_M: f32 = 0.06;
@@ -180,7 +180,7 @@ fn failure_likelihood(capability: &Capability, failed: &FailedAttempt) -> f32 {
         AttemptKind::RemoveObstacle => f32::from(u8::from(capability.removes_obstacles)),
     };
     let real = reliability(failed.strength);
-    real * (1.0 - chance).max(UNEXPLAINED_FAILURE) + (1.0 - real) * UNINFORMED
+    real * (1.0 - chance).max(UNEXPLAINED_FAILURE) + (1.0 - real) * MISRECOGNIZED_FAILURE
 }
 
 /// Returns the likelihood of an estimated speed for a person of this true speed, in meters per

@@ -1,4 +1,4 @@
-//! Result of exploration, for both strategies.
+//! Result of a step of exploration, for all strategies.
 
 use crate::track::Intent;
 
@@ -7,6 +7,6 @@ use crate::track::Intent;
 pub enum ExplorationStep {
     /// Take this action next.
     Act(Intent),
-    /// The current frontier is resolved; call again for the next one.
+    /// The target is reached or given up; the plan to explore is done.
     Resolved,
 }

@@ -247,7 +247,8 @@ impl SemanticMap {
         self.n_changes
     }
 
-    /// Increases when a large object appears, disappears, moves or grows.
+    /// Increases with every change that may affect path costs: a new, forgotten or removed object, an
+    /// object that is missing, or a large object that moves or grows.
     pub fn layout_version(&self) -> u32 {
         self.layout_version
     }

@@ -1,9 +1,12 @@
 //! Policy that stays near the partner, for collecting videos of people's actions.
 
 use chaic_core::briefing::CompanionRole;
-use chaic_core::{AgentError, Briefing};
+use chaic_core::{AgentError, Briefing, Frame};
 
 use crate::decision::{Context, Plan, Policy};
+
+/// Maximum age of a sighting that is followed, frames; after an unsuccessful walk it is older. Ours.
+const MAX_SIGHTING_AGE_FRAMES: Frame = 60;
 
 /// Follows the partner, and searches for it when it is lost.
 #[derive(Clone, Debug, Default)]
@@ -14,9 +17,9 @@ pub struct FollowPolicy {
 impl FollowPolicy {
     /// Returns a plan to follow the partner or, if its position is unknown, to search for it.
     pub fn decide(&mut self, context: &Context<'_>, valid: &[Plan]) -> Plan {
-        // A sighting that led nowhere is 60 frames old by then.
         let partner = context.memory.companion(context.briefing, CompanionRole::Partner);
-        let is_fresh = partner.is_some_and(|p| p.frame + 60 > context.memory.frame);
+        let is_fresh =
+            partner.is_some_and(|p| p.frame + MAX_SIGHTING_AGE_FRAMES > context.memory.frame);
         if valid.contains(&Plan::FollowPartner) && is_fresh {
             self.has_looked_around = false;
             return Plan::FollowPartner;

@@ -263,7 +263,8 @@ impl InferPolicy {
         }
     }
 
-    /// Returns the most likely goal, with more objects of each class than any episode has.
+    /// Returns the most likely goal. Unless the goal is granted, its numbers of objects are those of
+    /// [`goals`](Self::goals): more than any episode has, except for fragile and extra classes.
     fn most_likely_goal(&self, briefing: &Briefing) -> Option<Goal> {
         let goals = self.goals(briefing);
         let best = goals.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;

@@ -4,7 +4,7 @@
 use chaic_episodes::find_episode;
 
 use super::*;
-use crate::player::ReplayPlayer;
+use crate::player::tests::verified;
 
 fn episode() -> Vec<u8> {
     let mut setup = find_episode("low_target/test/00").unwrap().into_setup();
@@ -53,7 +53,7 @@ fn an_episode_of_plans_verifies_in_each_seat() {
         }
         play(&mut session);
         assert!(session.state().progress.is_some(), "the end tells the result");
-        let player = ReplayPlayer::open(session.trace().as_bytes(), &episode).unwrap();
+        let player = verified(session.trace(), &episode).unwrap();
         let replay = player.info();
         assert_eq!((replay.n_verified, &replay.problem), (replay.n_decisions, &None));
         assert!(replay.decisions.iter().filter(|line| line.agent == seat).count() > 20);
@@ -72,7 +72,7 @@ fn an_episode_that_is_stopped_verifies_up_to_its_last_decision() {
             choose_first(&mut session);
         }
     }
-    let player = ReplayPlayer::open(session.trace().as_bytes(), &episode).unwrap();
+    let player = verified(session.trace(), &episode).unwrap();
     assert_eq!(player.info().n_verified, player.info().n_decisions);
 }
 
@@ -117,7 +117,7 @@ fn a_live_world_goes_on_while_the_person_chooses() {
     for session in [&session, &steps] {
         let trace = session.trace();
         assert!(trace.contains("\"is_live\":true"));
-        let player = ReplayPlayer::open(trace.as_bytes(), &episode).unwrap();
+        let player = verified(&trace, &episode).unwrap();
         assert_eq!(player.info().n_verified, player.info().n_decisions);
     }
     assert!(steps.trace().contains("\"turn_left\""));
@@ -165,7 +165,7 @@ fn a_branch_continues_a_trace() {
         assert_eq!(common(&branch.trace()), common(&parent));
         play(&mut branch);
         assert!(branch.trace().contains(&format!("\"frame\":{frame}}}")), "it names the frame");
-        let player = ReplayPlayer::open(branch.trace().as_bytes(), &episode).unwrap();
+        let player = verified(branch.trace(), &episode).unwrap();
         assert_eq!(player.info().problem, None);
     }
 }

@@ -4,12 +4,12 @@
 use chaic_core::AgentId;
 use chaic_env::narration::ActivityKind;
 
-use crate::player::tests::played;
+use crate::player::tests::{played, verified};
 use crate::player::{ReplayPlayer, RerunState};
 
 /// Opens a replay and runs its agents to the end.
 fn rerun(trace: &str, episode: &str) -> (ReplayPlayer, RerunState) {
-    let mut player = ReplayPlayer::open(trace.as_bytes(), episode.as_bytes()).unwrap();
+    let mut player = verified(trace, episode).unwrap();
     loop {
         let state = player.rerun_agents().unwrap();
         if state.is_complete {
@@ -24,7 +24,7 @@ fn both_agents_run_again_and_remember_more_and_more() {
     let (mut player, state) = rerun(&trace, &episode);
     assert_eq!(state.frame, player.info().last_frame);
     let n_equal: usize = state.agents.iter().map(|agent| agent.n_equal).sum();
-    let decisions = &player.info().decisions;
+    let decisions = player.info().decisions;
     let n_of_both = decisions.iter().filter(|line| line.agent <= AgentId::HELPER).count();
     assert_eq!(n_equal, n_of_both, "{state:?}");
     assert!(state.agents.iter().all(|agent| agent.is_available && agent.differs_at.is_none()));
@@ -56,7 +56,7 @@ fn both_agents_run_again_and_remember_more_and_more() {
 fn a_path_is_shown_while_an_agent_walks() {
     let (trace, episode) = played("no_constraint/test/00", "rhp", 450);
     let (mut player, _) = rerun(&trace, &episode);
-    let walks = player.info().timeline.activities.clone();
+    let walks = player.info().timeline.activities;
     let of_helper = walks.iter().filter(|activity| activity.agent == AgentId::HELPER);
     let mut n_paths = 0;
     for walk in of_helper.filter(|activity| activity.kind == ActivityKind::Walk) {
@@ -70,7 +70,7 @@ fn a_path_is_shown_while_an_agent_walks() {
 #[test]
 fn nothing_is_shown_before_the_agents_have_run() {
     let (trace, episode) = played("no_constraint/test/00", "rhp", 300);
-    let mut player = ReplayPlayer::open(trace.as_bytes(), episode.as_bytes()).unwrap();
+    let mut player = verified(&trace, &episode).unwrap();
     player.seek(200).unwrap();
     assert!(player.memory(AgentId::PARTNER).is_none());
     assert!(player.explored(AgentId::PARTNER).is_empty());
@@ -101,7 +101,7 @@ fn another_helper_has_no_memory_from_the_first_different_action_on() {
 #[test]
 fn objects_beyond_the_limits_of_the_partner_are_named() {
     let (trace, episode) = played("low_target/test/00", "none", 60);
-    let player = ReplayPlayer::open(trace.as_bytes(), episode.as_bytes()).unwrap();
+    let player = verified(&trace, &episode).unwrap();
     let [low_m, high_m] = player.info().agents[0].reach_m;
     let objects = player.task_objects();
     assert!(objects.iter().any(|object| !object.limits.is_empty()), "this task has low objects");

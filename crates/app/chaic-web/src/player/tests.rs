@@ -27,12 +27,21 @@ pub(crate) fn played(id: &str, helper: &str, n_frames: Frame) -> (String, String
     (lines.join("\n") + "\n", episode.to_json())
 }
 
+/// Opens a replay and re-simulates all of it.
+pub(crate) fn verified(
+    trace: impl AsRef<[u8]>,
+    episode: impl AsRef<[u8]>,
+) -> Result<ReplayPlayer, PlayerError> {
+    let mut player = ReplayPlayer::open(trace.as_ref(), episode.as_ref())?;
+    assert!(player.verify(Frame::MAX));
+    Ok(player)
+}
+
 #[test]
 fn a_frame_is_the_same_however_it_is_reached() {
     let (trace, episode) = played("shopping/test/00", "rhp", 450);
-    let open = || ReplayPlayer::open(trace.as_bytes(), episode.as_bytes()).unwrap();
-    let mut player = open();
-    let info = player.info().clone();
+    let mut player = verified(&trace, &episode).unwrap();
+    let info = player.info();
     assert_eq!((info.last_frame, info.length, info.problem), (450, 450, None));
     assert!(info.n_verified == info.n_decisions && info.n_decisions > 50);
     assert!(info.agents.len() == 3 && info.total > 0.0);
@@ -72,8 +81,7 @@ fn an_altered_trace_is_shown_up_to_the_frame_that_differs() {
     let (trace, episode) = played("no_constraint/test/00", "random", 300);
     let line = trace.lines().skip(1).filter(|line| line.contains("\"turn_left\"")).nth(3).unwrap();
     let altered = trace.replacen(line, &line.replace("turn_left", "turn_right"), 1);
-    let player = ReplayPlayer::open(altered.as_bytes(), episode.as_bytes()).unwrap();
-    let info = player.info();
+    let info = verified(&altered, &episode).unwrap().info();
     let problem = info.problem.as_deref().unwrap_or_default();
     assert!(problem.contains("digest") || problem.contains("too late"), "{problem}");
     assert!(info.last_frame < 300 && info.length == 300 && info.n_verified < info.n_decisions);
@@ -88,9 +96,7 @@ fn an_altered_trace_is_shown_up_to_the_frame_that_differs() {
 fn damaged_and_foreign_files_are_refused() {
     let (trace, episode) = played("no_constraint/test/00", "none", 300);
     let (_, other) = played("no_constraint/test/01", "none", 60);
-    let open = |trace: &str, episode: &str| {
-        ReplayPlayer::open(trace.as_bytes(), episode.as_bytes()).map(|player| player.info().clone())
-    };
+    let open = |trace: &str, episode: &str| verified(trace, episode).map(|player| player.info());
     for (trace, episode) in [
         ("", &*episode),
         ("{}", &episode),
@@ -104,4 +110,28 @@ fn damaged_and_foreign_files_are_refused() {
     }
     let cut = open(&trace[..trace.len() * 9 / 10], &episode).unwrap();
     assert!(cut.problem.is_some() && cut.n_verified > 0, "{cut:?}");
+}
+
+#[test]
+fn a_replay_can_be_shown_while_it_is_verified() {
+    let (trace, episode) = played("low_target/test/00", "rhp", 300);
+    let mut expected = verified(&trace, &episode).unwrap();
+    let mut player = ReplayPlayer::open(trace.as_bytes(), episode.as_bytes()).unwrap();
+    let start = player.info();
+    assert_eq!((start.last_frame, start.is_complete, start.n_verified), (0, false, 0));
+    assert_eq!((start.length, start.n_decisions), (300, expected.info().n_decisions));
+    let view = |player: &mut ReplayPlayer, frame| {
+        player.seek(frame).unwrap();
+        let state = player.state();
+        (state.frame, player.draw_view(AgentId::PARTNER, 64).unwrap())
+    };
+    // A frame that is not verified yet is not shown.
+    assert_eq!(view(&mut player, 250), view(&mut expected, 0));
+    assert!(!player.verify(130));
+    assert_eq!(view(&mut player, 250), view(&mut expected, 130));
+    assert!(player.info().n_verified > 0 && !player.info().is_complete);
+    while !player.verify(7) {}
+    let json = |player: &ReplayPlayer| serde_json::to_string(&player.info()).unwrap();
+    assert_eq!(json(&player), json(&expected));
+    assert_eq!(view(&mut player, 250), view(&mut expected, 250));
 }

@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use crate::error::{EvalError, Result};
-use crate::figure::{Bar, Bars, FigureError, HelperBars, svg_text, transport_rate};
+use crate::figure::{
+    Bar, Bars, FigureError, HelperBars, MAX_HELPERS, MAX_TASKS, svg_text, transport_rate,
+};
 use crate::metrics::{Score, Scores};
 use crate::report::labels::Labels;
 use crate::report::tables::shown_interval;
@@ -15,6 +17,12 @@ use crate::report::tables::shown_interval;
 /// written.
 pub fn write_figure(scores: &Scores, labels: Labels<'_>, path: &Path) -> Result<()> {
     transport_rate(&bars(scores, labels), path).map_err(convert_error)
+}
+
+/// Returns true if a figure can show that many tasks and helpers.
+pub(super) fn fits_figure(scores: &Scores) -> bool {
+    (1..=MAX_TASKS).contains(&scores.tasks().len())
+        && (1..=MAX_HELPERS).contains(&scores.helpers().len())
 }
 
 /// Returns the same figure as SVG text.

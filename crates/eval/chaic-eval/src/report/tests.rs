@@ -6,8 +6,9 @@ use chaic_env::rules::RuleSetName;
 use chaic_env::{Digest, RunKey};
 
 use super::*;
+use crate::figure::MAX_HELPERS;
 use crate::metrics::{FormulaSet, RunResult, RunStatus, Summary};
-use crate::run::{EpisodeJob, RunGrants, RunOptions};
+use crate::run::{EpisodeJob, FolderMode, RunFolder, RunGrants, RunOptions};
 
 fn results() -> Vec<RunResult> {
     let mut results = Vec::new();
@@ -113,6 +114,42 @@ fn an_unfinished_run_is_reported() {
     assert_eq!(row["incomplete"], true);
     assert_eq!(row["missing"], serde_json::json!(["obstacle/test/01 seed 0"]));
     assert_eq!(json["tasks"]["obstacle"]["none"]["incomplete"], false);
+}
+
+#[test]
+fn a_report_of_many_helpers_is_written_without_figures() {
+    for (n_helpers, has_figures) in [(MAX_HELPERS, true), (MAX_HELPERS + 1, false)] {
+        let of_helper = |k: usize| {
+            let mut result = results().remove(0);
+            result.key.helper = format!("helper{k:02}");
+            result
+        };
+        let results: Vec<RunResult> = (0..n_helpers).map(of_helper).collect();
+        let job = |r: &RunResult| EpisodeJob {
+            environment: r.key.episode.clone(),
+            key: r.key.clone(),
+            horizon: 1000,
+        };
+        let planned: Vec<EpisodeJob> = results.iter().map(job).collect();
+        let helpers = results.iter().map(|r| r.key.helper.clone()).collect();
+        let options = RunOptions { helpers, ..options() };
+        let formulas = FormulaSet::Paper;
+        let report = Report {
+            options: &options,
+            results: &results,
+            planned: &planned,
+            granted: None,
+            formulas,
+        };
+        let temporary = tempfile::tempdir().unwrap();
+        let (folder, _) = RunFolder::lock(&temporary.path().join("run"), FolderMode::New).unwrap();
+        write_files(&folder, &report).unwrap();
+        assert!(folder.join("scores.json").is_file() && folder.join("report.md").is_file());
+        for figure in ["figure.svg", "figure.png"] {
+            assert_eq!(folder.join(figure).is_file(), has_figures, "{n_helpers} {figure}");
+        }
+        assert_eq!(differing_files(&folder, &report).unwrap(), (vec![], vec![]));
+    }
 }
 
 #[test]

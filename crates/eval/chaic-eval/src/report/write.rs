@@ -14,7 +14,7 @@ use crate::metrics::{
 };
 use crate::report::Format;
 use crate::report::coverage::coverage;
-use crate::report::figure::{figure_text, write_figure};
+use crate::report::figure::{figure_text, fits_figure, write_figure};
 use crate::report::labels::{GrantsFile, Labels};
 use crate::report::tables::{
     FAILED, MISSING, additional, counts, diagnostics, intervals, main_result, pairs, resolutions,
@@ -326,23 +326,30 @@ fn csv_cell(value: Option<f64>) -> String {
 impl Report<'_> {
     /// Returns the text files of the report by name. Leaves out the figure if it can't show that
     /// many helpers.
-    fn texts(&self) -> Vec<(&'static str, String)> {
-        let figure =
-            figure_text(&self.scores(), self.labels()).ok().map(|figure| ("figure.svg", figure));
-        let texts = [("scores.json", self.json()), ("report.md", self.markdown())];
-        texts.into_iter().chain(figure).collect()
+    fn texts(&self) -> Result<Vec<(&'static str, String)>> {
+        let mut texts = vec![("scores.json", self.json()), ("report.md", self.markdown())];
+        let scores = self.scores();
+        if fits_figure(&scores) {
+            texts.push(("figure.svg", figure_text(&scores, self.labels())?));
+        }
+        Ok(texts)
     }
 }
 
-/// Writes `scores.json`, `report.md`, `figure.svg` and `figure.png` into the run's folder.
+/// Writes `scores.json`, `report.md`, `figure.svg` and `figure.png` into the run's folder. Leaves out
+/// both figures if they can't show that many helpers.
 ///
 /// # Errors
 /// If a file can't be written.
 pub fn write_files(folder: &RunFolder, report: &Report<'_>) -> Result<()> {
-    for (name, text) in report.texts() {
+    for (name, text) in report.texts()? {
         folder.write(name, text.as_bytes())?;
     }
-    write_figure(&report.scores(), report.labels(), &folder.join(FIGURE_PNG))
+    let scores = report.scores();
+    if fits_figure(&scores) {
+        write_figure(&scores, report.labels(), &folder.join(FIGURE_PNG))?;
+    }
+    Ok(())
 }
 
 /// Compares the files of a report with the output of [`write_files`]. Returns the names of missing
@@ -357,7 +364,7 @@ pub fn differing_files(
     report: &Report<'_>,
 ) -> Result<(Vec<&'static str>, Vec<&'static str>)> {
     let (mut missing, mut altered) = (Vec::new(), Vec::new());
-    for (name, text) in report.texts() {
+    for (name, text) in report.texts()? {
         let path = folder.join(name);
         match kind(&path)? {
             EntryKind::Missing => missing.push(name),

@@ -1,4 +1,5 @@
-//! Journal of a run: one line per finished episode run, synced to disk before the next one starts.
+//! Journal of a run: one line per finished episode run, synced to disk before the run counts as
+//! finished.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead as _, BufReader, ErrorKind, Read as _, Write as _};

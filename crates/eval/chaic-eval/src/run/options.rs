@@ -1,4 +1,4 @@
-//! Options of a run. All of them change scores, so a run can only be resumed with the same options.
+//! Options of a run. A run can only be resumed with the same options.
 
 use std::path::{Path, PathBuf};
 
@@ -166,6 +166,9 @@ impl RunOptions {
         option("perception", self.perception.clone());
         option("behavior", self.behavior.clone());
         option("track", (self.track != Track::default()).then(|| self.track.to_string()));
+        if !self.traces {
+            words.push("--no-traces".to_owned());
+        }
         words.join(" ")
     }
 

@@ -30,7 +30,7 @@ pub enum OpponentInput {
     /// None.
     None,
     /// A model that sees the partner's actions.
-    Seen,
+    Observed,
     /// A model that is granted the partner's actions.
     Granted,
 }
@@ -38,13 +38,13 @@ pub enum OpponentInput {
 impl OpponentInput {
     /// All of them.
     pub const ALL: [OpponentInput; 3] =
-        [OpponentInput::None, OpponentInput::Seen, OpponentInput::Granted];
+        [OpponentInput::None, OpponentInput::Observed, OpponentInput::Granted];
 
     /// Input for this opponent model.
     pub fn from_model(model: Option<&OpponentModel>) -> OpponentInput {
         match model.map(OpponentModel::is_granted) {
             None => OpponentInput::None,
-            Some(false) => OpponentInput::Seen,
+            Some(false) => OpponentInput::Observed,
             Some(true) => OpponentInput::Granted,
         }
     }
@@ -53,7 +53,7 @@ impl OpponentInput {
     pub(crate) fn kind_suffix(self) -> &'static str {
         match self {
             OpponentInput::None => "",
-            OpponentInput::Seen => ", opponent model 2",
+            OpponentInput::Observed => ", opponent model 2",
             OpponentInput::Granted => ", granted opponent model 2",
         }
     }

@@ -200,7 +200,7 @@ impl Trainer for OpponentTrainer {
 
     fn check(config: &OpponentConfig) -> Result<(), String> {
         if let Some(path) = &config.windows {
-            let windows = read(path).map_err(|e| e.to_string())?;
+            let windows = read_from_user_path(path).map_err(|e| e.to_string())?;
             if windows.is_empty() {
                 return Err(format!("{}: {}", path.display(), CollectError::Empty));
             }

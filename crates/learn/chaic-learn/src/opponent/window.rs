@@ -13,7 +13,7 @@ use chaic_core::{Action, AgentId, Briefing, ClassId, Frame, Role, Vec3};
 
 use super::is_pickable;
 use crate::candidate_scorer::CandidateSet;
-use crate::scales::{TARGET_SETS, flag, log_mass, normalize_clamped, recency};
+use crate::scales::{TARGET_SETS, TIME_SCALE_FRAMES, flag, log_mass, normalize_clamped, recency};
 
 /// Number of observations in a window (paper, appendix on learning).
 pub const LENGTH: usize = 5;
@@ -98,7 +98,9 @@ pub const N_STATE: usize = STATE_FEATURES.len();
 /// Number of class features.
 pub const N_CLASS: usize = CLASS_FEATURES.len() + TARGET_SETS.len();
 
-const DISTANCE_SCALE_M: f32 = 10.0;
+/// Distance at which features of distance saturate, meters.
+const NEAR_SCALE_M: f32 = 10.0;
+/// Height at which features of height saturate, meters.
 const HEIGHT_SCALE_M: f32 = 2.0;
 /// Change of distance within a window at which the feature saturates, meters.
 const APPROACH_SCALE_M: f32 = 1.0;
@@ -234,16 +236,16 @@ impl ObservationHistory {
             n_seen as f32 / LENGTH as f32,
             flag(self.snapshots.back().is_some_and(|s| s.partner.is_some())),
             partner.map_or(1.0, |at| {
-                normalize_clamped(horizontal_distance(memory.pose.position, at), DISTANCE_SCALE_M)
+                normalize_clamped(horizontal_distance(memory.pose.position, at), NEAR_SCALE_M)
             }),
             partner.map_or(0.0, |at| normalize_clamped(at.y, HEIGHT_SCALE_M)),
             path.speed(path.first),
             path.speed(path.before_last),
             flag(goal.is_some()),
-            path.last.map_or(1.0, |(s, _)| normalize_clamped(s.goal_m, DISTANCE_SCALE_M)),
+            path.last.map_or(1.0, |(s, _)| normalize_clamped(s.goal_m, NEAR_SCALE_M)),
             path.approach(goal_m),
             path.heading(goal),
-            path.last.map_or(1.0, |(s, _)| normalize_clamped(nearest_m(s), DISTANCE_SCALE_M)),
+            path.last.map_or(1.0, |(s, _)| normalize_clamped(nearest_m(s), NEAR_SCALE_M)),
             path.approach(nearest_m),
             path.heading(nearest_at),
             normalize_clamped(behavior.partner_holds.len() as f32, 3.0),
@@ -270,7 +272,7 @@ impl ObservationHistory {
             log_mass(actions.heaviest_kg(&actions.taken)),
             flag(actions.taken.iter().any(|object| object.class.info().role == Role::Obstacle)),
             memory.frame as f32 / briefing.horizon.max(1) as f32,
-            normalize_clamped(briefing.horizon as f32, 3000.0),
+            normalize_clamped(briefing.horizon as f32, TIME_SCALE_FRAMES),
             flag(has_child),
             flag(moves_furniture),
             flag(has_child && briefing.containers.is_empty()),
@@ -310,12 +312,12 @@ impl ObservationHistory {
         };
         [
             normalize_clamped(objects().count() as f32, 4.0),
-            path.last.map_or(1.0, |(s, _)| normalize_clamped(s.distances_m[k], DISTANCE_SCALE_M)),
+            path.last.map_or(1.0, |(s, _)| normalize_clamped(s.distances_m[k], NEAR_SCALE_M)),
             path.approach(distance_m),
             path.heading(nearest_object.map(|t| t.position_in_world)),
             flag(nearest_class[0] == Some(k)),
             flag(nearest_class[1] == Some(k)),
-            min_m.map_or(1.0, |m| normalize_clamped(m, DISTANCE_SCALE_M)),
+            min_m.map_or(1.0, |m| normalize_clamped(m, NEAR_SCALE_M)),
             nearest_object.map_or(0.0, |t| normalize_clamped(t.top_m, HEIGHT_SCALE_M)),
             nearest_object.map_or(0.0, |t| normalize_clamped(t.bottom_m, HEIGHT_SCALE_M)),
             log_mass(info.mass_kg),

@@ -10,7 +10,7 @@ use crate::opponent::N_LIMITS;
 use crate::opponent::network::{N_GOALS, OpponentPrediction};
 use crate::scales::{flag, normalize_clamped};
 
-/// Width and height of the input image, pixels. The camera image is an integer multiple of it.
+/// Width and height of the input image, pixels.
 pub const IMAGE_SIZE: usize = 128;
 /// Channels of the image: color and depth.
 pub const IMAGE_CHANNELS: usize = 4;
@@ -97,13 +97,20 @@ impl VisualObservation {
     }
 }
 
+/// Returns the pixel at the center of part `x` of [`IMAGE_SIZE`] equal parts of `side` pixels.
+fn sample(x: usize, side: usize) -> usize {
+    (2 * x + 1) * side / (2 * IMAGE_SIZE)
+}
+
+/// Returns the input image, [`IMAGE_SIZE`], [`IMAGE_SIZE`], [`IMAGE_CHANNELS`]: samples of the upper
+/// left square of the camera image, at the centers of equal parts.
 fn image(observation: &Observation, rgb: Option<&[u8]>) -> Vec<u8> {
     let Camera { width, height, .. } = observation.camera;
-    let stride = (width.min(height) as usize) / IMAGE_SIZE;
+    let side = width.min(height) as usize;
     let mut image = vec![0; IMAGE_SIZE * IMAGE_SIZE * IMAGE_CHANNELS];
     let (Some(rgb), Some(depth_m)) = (rgb, &observation.images.depth_m) else { return image };
     for (k, to) in image.chunks_exact_mut(IMAGE_CHANNELS).enumerate() {
-        let [row, column] = [k / IMAGE_SIZE, k % IMAGE_SIZE].map(|x| x * stride + stride / 2);
+        let [row, column] = [k / IMAGE_SIZE, k % IMAGE_SIZE].map(|x| sample(x, side));
         let from = row * width as usize + column;
         to[..3].copy_from_slice(&rgb[3 * from..3 * from + 3]);
         to[3] = byte(normalize_clamped(depth_m[from], MAX_DEPTH_M));
@@ -143,4 +150,22 @@ fn state(
 /// Encodes a number from 0 to 1 as a byte.
 fn byte(x: f32) -> u8 {
     (255.0 * x.clamp(0.0, 1.0)) as u8
+}
+
+#[cfg(test)]
+mod tests {
+    //! Promise: the input covers camera images of every size.
+
+    use super::*;
+
+    #[test]
+    fn samples_are_spread_over_images_of_every_size() {
+        for side in [16, 64, 128, 256, 300, 512] {
+            let samples: Vec<usize> = (0..IMAGE_SIZE).map(|x| sample(x, side)).collect();
+            let gap = side.div_ceil(IMAGE_SIZE);
+            assert!(samples[0] < gap && samples[IMAGE_SIZE - 1] + gap >= side, "{side}");
+            assert!(samples.windows(2).all(|pair| pair[1] - pair[0] <= gap), "{side}");
+        }
+        assert_eq!([0, 1, 127].map(|x| sample(x, 256)), [1, 3, 255]);
+    }
 }

@@ -163,7 +163,7 @@ fn a_folder_of_weights_is_a_policy_per_task() {
     write_visual_policy(&files[1], OpponentInput::None, 3);
     assert_ne!(make(folder.path()).agent.weights(), digest, "every file counts");
     // Policies with other inputs, and a folder without weights.
-    write_visual_policy(&files[1], OpponentInput::Seen, 2);
+    write_visual_policy(&files[1], OpponentInput::Observed, 2);
     let problem = NamedPolicy::read("mine", folder.path()).err().unwrap().to_string();
     assert!(problem.contains("other inputs"), "{problem}");
     let empty = tempfile::tempdir().unwrap();

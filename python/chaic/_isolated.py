@@ -10,6 +10,7 @@ import shlex
 import sys
 import types
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +47,13 @@ _UNREACHABLE = (
 )
 
 
+def without_partial(maker: Callable[[], Any]) -> Callable[..., Any]:
+    """Returns the class or function of a ``functools.partial``, or ``maker`` itself."""
+    while isinstance(maker, partial):
+        maker = maker.func
+    return maker
+
+
 def readable(maker: Callable[[], Any]) -> list[str]:
     """Returns the files and folders that the process needs: the interpreter, installed packages, the helper's file.
 
@@ -57,7 +65,7 @@ def readable(maker: Callable[[], Any]) -> list[str]:
         folder = Path(entry).absolute()
         if folder.exists() and not here.is_relative_to(folder):
             found.add(str(folder))
-    module = sys.modules.get(getattr(maker, "__module__", None) or "")
+    module = sys.modules.get(getattr(without_partial(maker), "__module__", None) or "")
     file = getattr(module, "__file__", None) or _main_file()
     if file is not None:
         package = "." in module.__name__ if module is not None else False

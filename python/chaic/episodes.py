@@ -78,7 +78,12 @@ class EpisodeSource:
     def choose(
         self, rng: np.random.Generator, options: Mapping[str, Any] | None
     ) -> tuple[Episode, int]:
-        """Returns the episode and seed in the options of a reset; draws those that the options do not contain."""
+        """Returns the episode and seed in the options of a reset; draws those that the options do not contain.
+
+        Raises ``ValueError`` for other options.
+        """
+        if unknown := set(options or ()) - {"episode", "seed"}:
+            raise ValueError(f"no reset option {sorted(unknown)}; the options are episode and seed")
         episode, seed = self.draw(rng)
         if options is not None and "episode" in options:
             episode, seed = self.get(options["episode"]), 0

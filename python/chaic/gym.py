@@ -7,6 +7,7 @@ for ``action_space.sample``: the actions that the hands allow, or the offered pl
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -167,9 +168,11 @@ class HelperEnv(gymnasium.Env[Any, Any]):
 
     def _step_plan(self, action: Any) -> float:
         assert self._planner is not None
-        if not isinstance(action, int | np.integer):
-            raise ValueError(f"{action!r} is not in {self.action_space}")
-        index = int(action)
+        # Policies may return an array without dimensions.
+        try:
+            index = operator.index(action)
+        except TypeError:
+            raise ValueError(f"{action!r} is not in {self.action_space}") from None
         if not self.action_space.contains(index):
             raise ValueError(f"{action!r} is not in {self.action_space}")
         if index < len(self._planner.plans()):
@@ -224,7 +227,8 @@ class HelperEnv(gymnasium.Env[Any, Any]):
             plans = np.zeros((spaces.MAX_PLANS, vectors.shape[1]), np.float32)
             plans[: len(vectors)] = vectors
             out["plans"] = plans
-        self._last = out
+        # A caller may change what it gets.
+        self._last = {part: array.copy() for part, array in out.items()}
         return out
 
     def action_masks(self) -> NDArray[np.bool_]:

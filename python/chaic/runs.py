@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from chaic import _chaic, _deprecated, _isolated
 from chaic._chaic import Briefing, Observation
+from chaic._isolated import without_partial
 from chaic._sandbox import launcher
 from chaic.episodes import task_names
 from chaic.watchdog import TimeLimitedHelper, Watchdog
@@ -50,7 +51,12 @@ Maker = Callable[[], Any]
 RENAMED_OPTIONS = {"first": "n_episodes", "beside": "baselines"}
 
 
+def _names(names: str | Sequence[str]) -> tuple[str, ...]:
+    return (names,) if isinstance(names, str) else tuple(names)
+
+
 def _name_of(maker: Maker) -> str:
+    maker = without_partial(maker)
     name = getattr(maker, "__name__", type(maker).__name__)
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
 
@@ -66,7 +72,7 @@ def evaluate(
     split: str = "test",
     n_episodes: int | None = None,
     seeds: int | None = None,
-    baselines: Sequence[str] = (),
+    baselines: str | Sequence[str] = (),
     out: str | os.PathLike[str] = "runs/python",
     jobs: int | None = None,
     resume: bool = False,
@@ -79,8 +85,8 @@ def evaluate(
 ) -> Run:
     """Plays a benchmark with Python helpers into the folder ``out``, and returns the run.
 
-    ``helper`` is a class (``Helper``) or another callable that creates a helper for each episode, or several of them by
-    name; all must request the same grants and images. ``n_episodes`` limits the episodes of each task. ``baselines`` names
+    ``helper`` is a class (``Helper``), a ``functools.partial`` of one, or another callable that creates a helper for each
+    episode, or several of them by name; all must request the same grants and images, as attributes of the callable. ``n_episodes`` limits the episodes of each task. ``baselines`` names
     built-in helpers for comparison; EI needs ``"none"``. ``jobs`` episodes run in parallel (default: one per core); their
     Python helpers share the interpreter lock. Further options are those of ``chaic eval``: ``episodes``, ``rules``, ``set``,
     ``traces``, ``perception``, ``behavior``, ``track``. ``track="hidden"`` refuses all grants except ``goal_place``.
@@ -99,10 +105,10 @@ def evaluate(
     ``KeyboardInterrupt`` stops the run; ``resume=True`` continues it. ``first`` and ``beside`` are deprecated names of
     ``n_episodes`` and ``baselines``.
     """
-    given = {"n_episodes": n_episodes, "baselines": tuple(baselines) or None}
+    given = {"n_episodes": n_episodes, "baselines": _names(baselines) or None}
     options |= {name: value for name, value in given.items() if value is not None}
     _deprecated.rename_keys(options, RENAMED_OPTIONS)
-    baselines = options.pop("baselines", ())
+    baselines = _names(options.pop("baselines", ()))
     makers = _makers(helper)
     requirements = {_requirements(maker) for maker in makers.values()}
     if len(requirements) > 1:
@@ -115,7 +121,7 @@ def evaluate(
     helpers += [(name, partial(TimeLimitedHelper, maker, watchdog)) for name, maker in makers.items()]
     if not helpers:
         raise ValueError("give a helper or baselines")
-    options |= {"split": None if "episodes" in options else split, "seeds": seeds}
+    options |= {"split": split if options.get("episodes") is None else None, "seeds": seeds}
     if tasks is not None:
         options["tasks"] = task_names(tasks)
     if read and not isolate:
@@ -198,9 +204,10 @@ def _isolation(
 
 
 def _requirements(maker: Maker) -> tuple[tuple[str, ...], tuple[str, ...], int]:
+    maker = without_partial(maker)
     return (
-        tuple(getattr(maker, "grants", Helper.grants)),
-        tuple(getattr(maker, "images", Helper.images)),
+        _names(getattr(maker, "grants", Helper.grants)),
+        _names(getattr(maker, "images", Helper.images)),
         int(getattr(maker, "image_size", Helper.image_size)),
     )
 
@@ -214,6 +221,8 @@ class Replay:
 
     def _repr_html_(self) -> str:
         data = base64.b64encode(self.path.read_bytes()).decode()
+        if self.path.suffix == ".gif":
+            return f'<img alt="Replay" src="data:image/gif;base64,{data}">'
         return f'<video controls src="data:video/mp4;base64,{data}"></video>'
 
     def __repr__(self) -> str:
@@ -334,7 +343,7 @@ class Run:
         return Page(path)
 
     def _repr_html_(self) -> str:
-        return f"<pre>{self.report()}</pre>"
+        return f"<pre>{html.escape(self.report())}</pre>"
 
     def __repr__(self) -> str:
         return f"Run({str(self.path)!r})"

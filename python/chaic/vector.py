@@ -25,9 +25,9 @@ PARTS = ("rgb", "depth", "ids", "own")
 class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
     """Helpers in ``num_envs`` worlds, each with its simulated partner; options as in ``chaic.gym.HelperEnv``.
 
-    The final observation of an episode is that of the last decision. Each step overwrites the arrays of the observation;
-    ``copy=True`` returns new arrays. ``out`` maps parts of the observation to arrays to write into: NumPy arrays, or objects
-    with DLPack or the buffer protocol.
+    The final observation of an episode is that of the last decision. ``copy=False`` is faster: each step then overwrites the
+    arrays of the last observation. ``out`` maps parts of the observation to arrays to write into: NumPy arrays, or objects
+    with DLPack or the buffer protocol. ``copy`` is false by default with ``out``, and true without.
     """
 
     metadata = {"render_modes": ["rgb_array"], "autoreset_mode": AutoresetMode.NEXT_STEP}
@@ -47,7 +47,7 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
         partner_image_size: int | None = None,
         reward: Mapping[str, float] | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
-        copy: bool = False,
+        copy: bool | None = None,
         out: Mapping[str, Any] | None = None,
         render_mode: str | None = None,
         minds_image_size: int | None = None,
@@ -67,7 +67,7 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
         self.source = EpisodeSource(task, split)
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
-        self.copy = copy
+        self.copy = out is None if copy is None else copy
         self._options: dict[str, Any] = {
             "images": spaces.image_parts(self.parts),
             "image_size": image_size,
@@ -120,6 +120,8 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
     ) -> tuple[Arrays, dict[str, Any]]:
         """Starts episodes in all worlds, or in those of ``options["reset_mask"]``."""
         mask = np.ones(self.num_envs, bool)
+        if unknown := set(options or ()) - {"reset_mask"}:
+            raise ValueError(f"a vector environment has no reset option {sorted(unknown)}; it has reset_mask")
         if options is not None and "reset_mask" in options:
             mask = np.asarray(options["reset_mask"], bool)
             if mask.shape != (self.num_envs,):
@@ -271,7 +273,7 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
     def render(self) -> Any:
         """Returns the current color image of each helper."""
         if self.render_mode == "rgb_array" and "rgb" in self._arrays:
-            return tuple(self._arrays["rgb"])
+            return tuple(self._arrays["rgb"].copy())
         return None
 
 

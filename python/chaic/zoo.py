@@ -237,7 +237,7 @@ class PairEnv(_PairBase, AECEnv[str, Obs, Any]):
 
     def observe(self, agent: str) -> Obs:
         """Returns the observation of an agent when it last needed an action."""
-        return self._last[agent]
+        return dict(self._last[agent])
 
     def step(self, action: Any) -> None:
         """Submits the action of the selected agent; ``None`` for an agent that has ended."""
@@ -248,6 +248,7 @@ class PairEnv(_PairBase, AECEnv[str, Obs, Any]):
             self._was_dead_step(action)
             if self.agents and not self.world.is_over:
                 self._advance()
+                self._accumulate_rewards()
             return
         self._pair.submit(AGENTS.index(agent), action)
         self._n_actions[agent] += 1

@@ -210,3 +210,32 @@ def test_environments_run_in_separate_processes():
         envs.step(np.zeros((2, 3), np.int64))
         envs.close()
         assert observation["rgb"].shape == (2, 32, 32, 3)
+
+
+def test_a_vector_returns_new_arrays_unless_it_writes_into_given_ones():
+    wait = np.tile([chaic.ACTIONS.index("turn_left"), 0, 0], (2, 1))
+    for options, is_kept in [({}, True), ({"copy": False}, False)]:
+        vector = make(2, observation="own", **options)
+        first, _ = vector.reset(seed=0)
+        before = first["own"].copy()
+        vector.step(wait)
+        assert (first["own"] == before).all() == is_kept
+    with pytest.raises(ValueError, match="reset_mask"):
+        vector.reset(options={"episode": "obstacle/train/00"})
+
+
+def test_a_caller_may_change_what_it_gets():
+    env = HelperEnv("obstacle", action="plan", image_size=32)
+    observation, info = env.reset(seed=0)
+    with pytest.raises(ValueError, match="not in"):
+        env.step(np.array(0.5))
+    ended = False
+    while not ended:
+        observation.pop("depth")
+        # A policy returns an array without dimensions for one observation.
+        first = np.array(int(np.flatnonzero(info["action_mask"])[0]))
+        observation, _, terminated, truncated, info = env.step(first)
+        ended = terminated or truncated
+    assert env.observation_space.contains(observation)
+    with pytest.raises(ValueError, match="episode and seed"):
+        env.reset(options={"reset_mask": [True]})

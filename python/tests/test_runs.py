@@ -3,6 +3,7 @@
 import html
 import json
 import time
+from functools import partial
 
 import numpy as np
 import pytest
@@ -61,6 +62,12 @@ def test_a_python_helper_is_scored_and_verified(tmp_path):
         run.view("obstacle/test/00")
     with pytest.raises(RuntimeError):
         chaic.evaluate(Turner, out=tmp_path / "run", **OPTIONS)
+
+
+def test_a_partial_has_the_attributes_of_its_class(tmp_path):
+    run = chaic.evaluate(partial(Turner), out=tmp_path / "run", baselines="none", **OPTIONS)
+    assert run.options["helpers"] == ["none", "turner"]
+    assert not run.records()["broke_down"].any()
 
 
 def test_a_built_in_helper_acts_alike_from_python_and_rust(tmp_path):

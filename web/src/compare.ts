@@ -154,6 +154,11 @@ export class ChaicCompare extends LitElement {
       html`<p>
         <b>${label(info)}</b>: ${doneAt(info.timeline.deliveries, info.last_frame)} of ${info.total} delivered.
         ${badge(info)}
+        ${info.problem
+          ? html`<span class="problem" role="alert">
+              Shown up to frame ${info.last_frame} of ${info.length}: ${info.problem}
+            </span>`
+          : nothing}
       </p>`;
     return html`<header>
       <h2>${a.task}: ${label(a)} and ${label(b)}</h2>

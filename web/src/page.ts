@@ -116,7 +116,10 @@ class Replays {
     clearTimeout(this.pending);
     const { replay, other } = this.shown!;
     const name = other === undefined ? replay : `${replay}+${other}`;
-    this.pending = window.setTimeout(() => history.replaceState(null, "", `#${name}@${frame}`), 300);
+    this.pending = window.setTimeout(() => {
+      // Pages inside a notebook have no address.
+      if (location.protocol !== "about:") history.replaceState(null, "", `#${name}@${frame}`);
+    }, 300);
   }
 }
 

@@ -264,7 +264,7 @@ export class ChaicPlay extends LitElement {
     if (this.shown?.status === "waiting") this.input = { action };
   }
 
-  private point(event: PointerEvent): void {
+  private point(event: MouseEvent): void {
     if (this.game?.config.level !== "steps") return;
     const box = (event.currentTarget as HTMLElement).getBoundingClientRect();
     const at = (offset: number, size: number): number =>
@@ -321,7 +321,7 @@ export class ChaicPlay extends LitElement {
             height="512"
             role="img"
             aria-label="What you see"
-            @pointerdown=${(event: PointerEvent) => this.point(event)}
+            @click=${(event: MouseEvent) => this.point(event)}
           ></canvas>
         </figure>
         <div>

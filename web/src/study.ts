@@ -51,6 +51,10 @@ export class ChaicStudy extends LitElement {
   @state() private isResumed = false;
   @state() private isScanning = false;
   @state() private hasLeft = false;
+  /** True while a step is stored. */
+  private isChanging = false;
+  /** Last trial that has ended. */
+  private endedTrial?: number;
   @state() private problem?: string;
   /** State of a participation with a server, beside those of any. */
   @state() private waits?: "entry" | "full" | "deletion" | "removed";
@@ -162,10 +166,20 @@ export class ChaicStudy extends LitElement {
     this.at = checkpoint(this.steps, log.records);
   }
 
+  /** Runs a change of the state once: a second click before its end has no effect. */
+  private async once(change: () => Promise<void>): Promise<void> {
+    if (this.isChanging) return;
+    this.isChanging = true;
+    try {
+      await change();
+    } finally {
+      this.isChanging = false;
+    }
+  }
+
   /** The participant agrees: the log comes into being. */
   private async agree(): Promise<void> {
     const { format, version, chaic, digest, server } = this.content!;
-    // A second click would ask for a second slot.
     if (server) this.waits = "entry";
     const log = await StudyLog.open(this.logName(), true);
     if (!log) return;
@@ -303,6 +317,9 @@ export class ChaicStudy extends LitElement {
   }
 
   private endTrial(trial: number, outcome: TrialOutcome): void {
+    // A game that is stopped may end by itself at the same time.
+    if (this.endedTrial === trial) return;
+    this.endedTrial = trial;
     void this.store({ type: "trial_end", trial, outcome }).then(() => {
       this.playing = "over";
       void this.updateComplete.then(() => this.querySelector<HTMLElement>("#continue")?.focus());
@@ -455,7 +472,7 @@ export class ChaicStudy extends LitElement {
     return html`${this.heading(title)} ${paragraphs(consent)}
       <p class="small">Nothing is stored before you agree.</p>
       <p>
-        <button type="button" @click=${() => void this.agree()}>I agree and take part</button>
+        <button type="button" @click=${() => void this.once(() => this.agree())}>I agree and take part</button>
         <button type="button" @click=${() => void this.leave()}>I do not take part</button>
       </p>`;
   }
@@ -463,7 +480,7 @@ export class ChaicStudy extends LitElement {
   private instructions({ instructions }: StudyContent): TemplateResult {
     return html`${this.heading("Instructions")} ${paragraphs(instructions)}
       <p>Your code is <b class="code">${this.code()}</b>. Keep it: with it, the researchers can delete your data later.</p>
-      <p><button type="button" @click=${() => void this.advance({ type: "instructed" })}>Continue</button></p>`;
+      <p><button type="button" @click=${() => void this.once(() => this.advance({ type: "instructed" }))}>Continue</button></p>`;
   }
 
   private trial(step: Extract<Step, { kind: "trial" }>): TemplateResult {
@@ -478,7 +495,7 @@ export class ChaicStudy extends LitElement {
         ${this.isResumed ? html`<p>The study goes on here. ${resumed}</p>` : nothing}
         <p>${isPractice ? "This episode is for practice." : "This episode counts."}</p>
         <p>
-          <button type="button" @click=${() => void this.startTrial(step)}>
+          <button type="button" @click=${() => void this.once(() => this.startTrial(step))}>
             ${isOpen ? "Go on with the episode" : "Start the episode"}
           </button>
         </p>`;
@@ -492,7 +509,7 @@ export class ChaicStudy extends LitElement {
         @over=${(event: CustomEvent<TrialOutcome>) => this.endTrial(step.number, event.detail)}
       ></chaic-play>
       ${this.playing === "over"
-        ? html`<p>The episode is over. <button type="button" id="continue" @click=${() => void this.advance()}>Continue</button></p>`
+        ? html`<p>The episode is over. <button type="button" id="continue" @click=${() => void this.once(() => this.advance())}>Continue</button></p>`
         : nothing}`;
   }
 
@@ -500,7 +517,7 @@ export class ChaicStudy extends LitElement {
     const form = content.forms[step.name]!;
     const answered = (event: CustomEvent<Ratings>): void => {
       const { position, name } = step;
-      void this.advance({ type: "answers", position, form: name, ratings: event.detail });
+      void this.once(() => this.advance({ type: "answers", position, form: name, ratings: event.detail }));
     };
     // The next form starts without answers.
     return html`${this.heading(form.title)}

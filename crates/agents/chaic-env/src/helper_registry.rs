@@ -25,6 +25,9 @@ pub const POLICY: &str = "policy:";
 /// Prefixes of partners from files. Runs name them by digest, so they need the files again to resume.
 pub const PARTNER_FILES: [&str; 2] = [RECORDED, POLICY];
 
+/// Largest number of characters of a helper's name, which is the name of a folder.
+const MAX_NAME: usize = 40;
+
 /// A helper and its grants.
 pub struct Helper {
     /// Agent.
@@ -165,9 +168,9 @@ pub fn check_new_name(
     example: &str,
 ) -> std::result::Result<(), String> {
     let is_name = |c: char| c.is_ascii_alphanumeric() || "_-".contains(c);
-    if name.is_empty() || name.len() > 40 || !name.chars().all(is_name) {
+    if name.is_empty() || name.len() > MAX_NAME || !name.chars().all(is_name) {
         return Err(format!(
-            "`{name}` is not a valid name for a helper; use letters, digits, _ and -"
+            "`{name}` is not a valid name for a helper; use 1 to {MAX_NAME} letters, digits, _ and -"
         ));
     }
     if name == NONE || taken.iter().any(|t| t == name) {

@@ -114,7 +114,8 @@ impl SuitePartner {
         if name == RULES {
             return Some(format!("`{RULES}` is the ordinary partner, which every run plays"));
         }
-        match partner.as_deref().map(partner_habits) {
+        // The ordinary rules are no deviation.
+        match partner.as_deref().filter(|name| *name != RULES).map(partner_habits) {
             None if person.is_none() => Some(format!("`{name}` has no `partner` and no `person`")),
             Some(Err(HabitsError::Invalid(problem))) => Some(format!("`{name}`: {problem}")),
             _ => None,
@@ -248,6 +249,7 @@ mod tests {
             (entry(""), "0 partners, expected 1 to 100"),
             (entry(&many), "101 partners"),
             (entry(r#"{"name":"a"}"#), "`a` has no `partner` and no `person`"),
+            (entry(r#"{"name":"a","partner":"rules"}"#), "`a` has no `partner` and no `person`"),
             (entry(r#"{"name":"a/b","partner":"slow"}"#), "letters, digits"),
             (entry(r#"{"name":"","partner":"slow"}"#), "letters, digits"),
             (entry(r#"{"name":"rules","partner":"slow"}"#), "the ordinary partner"),

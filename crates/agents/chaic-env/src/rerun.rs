@@ -67,7 +67,10 @@ impl<T: Deref<Target = Trace>> AgentRerun<T> {
     pub fn new(trace: T, episode: &Episode, helpers: &dyn HelperRegistry) -> Result<AgentRerun<T>> {
         let playback = Playback::new(trace, episode)?;
         let (header, world) = (playback.header(), playback.world());
-        let people = header.people.iter().filter(|person| person.agent <= AgentId::HELPER);
+        // The header of an altered trace may name an agent that the episode lacks.
+        let n_people = world.setup().people.len();
+        let exists = |agent: AgentId| agent <= AgentId::HELPER && agent.index() < n_people;
+        let people = header.people.iter().filter(|person| exists(person.agent));
         let seats = people.map(|person| seat(header, person, world, helpers)).collect();
         let scene = Scene::with_appearance(world.setup(), header.appearance);
         let renderer = ObservationRenderer::new(Arc::new(scene));

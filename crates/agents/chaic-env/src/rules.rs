@@ -10,6 +10,9 @@ use serde_json::Value;
 
 use crate::error::{EnvError, Result};
 
+/// Largest duration of a part of an action, frames: over three times an episode of the paper.
+const MAX_DURATION: u64 = 10_000;
+
 /// Name of a rule set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -87,18 +90,31 @@ impl RuleSet {
         }
         let changed: RuleSet =
             serde_json::from_value(all).map_err(|e| wrong(format!("{hint}: {e}")))?;
-        changed.check_motion().map_err(wrong)?;
+        changed.check().map_err(wrong)?;
         Ok(changed)
     }
 
-    /// Checks the lengths of a turn and of a step; planners divide by them.
-    fn check_motion(&self) -> std::result::Result<(), String> {
-        let Rules { turn_rad, stride_m, .. } = self.world;
+    /// Checks the lengths of a turn and of a step, by which planners divide, and all durations.
+    ///
+    /// # Errors
+    /// One sentence that names the rule and its bounds.
+    pub fn check(&self) -> std::result::Result<(), String> {
+        let Rules { turn_rad, stride_m, durations, .. } = self.world;
         for (name, value, max) in
             [("turn_rad", turn_rad, std::f32::consts::PI), ("stride_m", stride_m, 10.0)]
         {
             if !(0.01..=max).contains(&value) {
                 return Err(format!("`world.{name}` is from 0.01 to {max:.2}"));
+            }
+        }
+        // Opening a hand releases the object in its last frame.
+        if durations.open_hand == 0 {
+            return Err("`world.durations.open_hand` is at least 1".to_owned());
+        }
+        let all = serde_json::to_value(durations).expect("durations have string keys");
+        for (name, frames) in all.as_object().into_iter().flatten() {
+            if frames.as_u64().is_some_and(|frames| frames > MAX_DURATION) {
+                return Err(format!("`world.durations.{name}` is at most {MAX_DURATION}"));
             }
         }
         Ok(())

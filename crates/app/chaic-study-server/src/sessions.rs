@@ -294,7 +294,7 @@ fn live_config(plan: &Plan, trial: Trial) -> LiveConfig {
             Input::Steps => InputLevel::Steps,
         },
         helper: plan.helper(trial).to_owned(),
-        is_live: plan.study().play.world == WorldPace::GoesOn,
+        is_live: plan.study().play.world == WorldPace::RealTime,
     }
 }
 

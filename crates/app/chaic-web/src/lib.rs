@@ -1,8 +1,7 @@
 //! Replays and play in a browser.
 //!
-//! **What it is**: the module that the pages of chaic load. A [`ReplayPlayer`] replays the whole trace
-//! once when it is opened, compares the digest of each decision with the recorded one, and then shows
-//! any frame. Partner and helper run again beside it, for drawings of what they know. A [`LiveSession`]
+//! **What it is**: the module that the pages of chaic load. A [`ReplayPlayer`] re-simulates a trace
+//! in steps, compares the digest of each decision with the recorded one, and shows any verified frame. Partner and helper run again beside it, for drawings of what they know. A [`LiveSession`]
 //! runs an episode in which a person controls an agent, from the start or from a frame of a trace; the
 //! server of a study uses it too. `bindings` exports both to JavaScript.
 //!

@@ -113,7 +113,7 @@ pub enum Command {
     Report(ReportArguments),
     /// Summarize a run: options, progress and scores.
     Show(ShowArguments),
-    /// List helpers, tasks, people, rules or runs.
+    /// List helpers, partners, tasks, people, rules or runs.
     #[command(subcommand)]
     List(ListCommand),
     /// Print what the helper of a recorded episode believed and planned.

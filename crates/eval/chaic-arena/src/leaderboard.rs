@@ -17,7 +17,7 @@ use chaic_eval::run::environments;
 use serde::Serialize;
 
 use crate::evaluation::EvaluationReport;
-use crate::score::{PlayRules, SubmissionScore};
+use crate::score::{EvaluationConditions, SubmissionScore};
 use row::csv_line;
 
 /// Format of [`Leaderboard`].
@@ -42,7 +42,7 @@ pub struct Leaderboard {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LeaderboardTable {
     /// The rules.
-    pub conditions: PlayRules,
+    pub conditions: EvaluationConditions,
     /// Number of environments of the episodes.
     pub environments: usize,
     /// Helper that the rows are compared with.
@@ -72,7 +72,7 @@ struct ConfirmedEntry {
 /// Collector of evaluations.
 #[derive(Debug, Default)]
 pub struct LeaderboardBuilder {
-    tables: BTreeMap<PlayRules, Vec<ConfirmedEntry>>,
+    tables: BTreeMap<EvaluationConditions, Vec<ConfirmedEntry>>,
     refused: Vec<RefusedEntry>,
 }
 
@@ -174,7 +174,7 @@ fn digest(result: &RunResult) -> Option<chaic_env::Digest> {
     result.summary().map(|summary| summary.digest)
 }
 
-fn table(conditions: PlayRules, entries: &[ConfirmedEntry]) -> LeaderboardTable {
+fn table(conditions: EvaluationConditions, entries: &[ConfirmedEntry]) -> LeaderboardTable {
     // The same episodes have the same environments.
     let environments = &entries[0].environments;
     // Built-in helpers that played for comparison, each with the entry that has it.
@@ -202,7 +202,7 @@ fn table(conditions: PlayRules, entries: &[ConfirmedEntry]) -> LeaderboardTable 
     let differences = with_holm(differences);
     let mut rows: Vec<LeaderboardRow> = references
         .iter()
-        .filter_map(|(name, entry)| LeaderboardRow::reference(entry, name))
+        .filter_map(|(name, entry)| LeaderboardRow::from_results(entry, name))
         .collect();
     let submissions = entries.iter().zip(differences);
     rows.extend(submissions.filter_map(|(entry, d)| LeaderboardRow::submission(entry, d)));

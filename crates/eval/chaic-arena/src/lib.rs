@@ -32,7 +32,8 @@ pub use manifest::{
     HelperSource, MANIFEST, MAX_MANIFEST_BYTES, Manifest, PlayConditions, PublicPart, Training,
 };
 pub use score::{
-    EpisodeOutcome, EpisodeRunRecord, PlayRules, PlayedRun, SubmissionRecord, SubmissionScore,
+    EpisodeOutcome, EpisodeRunRecord, EvaluationConditions, PlayedRun, SubmissionRecord,
+    SubmissionScore,
 };
 pub use sealed::{Commitment, SealedSplit};
 pub use secret::{Secret, SecretError};

@@ -33,8 +33,8 @@ pub struct SubmissionScore {
     pub(crate) version: u32,
     /// The submission.
     pub submission: SubmissionRecord,
-    /// Rules under which it was played.
-    pub conditions: PlayRules,
+    /// Conditions under which it was played.
+    pub conditions: EvaluationConditions,
     /// Grants by helper.
     pub grants: BTreeMap<String, GrantsFile>,
     /// Grants of the partner.
@@ -66,9 +66,10 @@ pub struct SubmissionRecord {
     pub sha256: String,
 }
 
-/// All that scores must have in common to be compared. Scores of different rules are never in one table.
+/// All that scores must have in common to be compared. Scores of different conditions are never in one
+/// table.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-pub struct PlayRules {
+pub struct EvaluationConditions {
     /// Version of chaic.
     pub chaic: String,
     /// Track.
@@ -171,13 +172,13 @@ impl PlayedRun {
         Ok(PlayedRun { folder, options, planned, results, episodes })
     }
 
-    fn rules(&self) -> PlayRules {
-        let RunOptions { tasks, seeds, size, rules, set, partner, partner_is, appearance, .. } =
+    fn conditions(&self) -> EvaluationConditions {
+        let RunOptions { tasks, seeds, size, rules, set, partner, person, appearance, .. } =
             &self.options;
         let mut tasks = tasks.clone();
         tasks.sort_unstable();
         let first = self.episodes.first().map_or("", |episode| episode.id());
-        PlayRules {
+        EvaluationConditions {
             chaic: CHAIC_VERSION.to_owned(),
             track: self.options.track.to_string(),
             rules: rules.to_string(),
@@ -190,7 +191,7 @@ impl PlayedRun {
             seeds: *seeds,
             size: *size,
             partner: partner.clone().unwrap_or_else(|| RULES.to_owned()),
-            person: partner_is.map(|change| change.to_string()),
+            person: person.map(|change| change.to_string()),
             appearance: appearance.clone().unwrap_or_else(|| Appearance::Canonical.to_string()),
         }
     }
@@ -251,7 +252,7 @@ impl SubmissionScore {
                 core_hours: manifest.training.core_hours,
                 sha256: submission.sha256().to_owned(),
             },
-            conditions: run.rules(),
+            conditions: run.conditions(),
             grants: labels.helpers_file(&run.options.helpers).unwrap_or_default(),
             partner: labels.partner_file(),
             tasks: report.scores().tasks,

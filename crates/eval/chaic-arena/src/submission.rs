@@ -187,7 +187,7 @@ impl Submission {
         ])?;
         let has_defaults = options.set.is_empty()
             && options.partner.is_none()
-            && options.partner_is.is_none()
+            && options.person.is_none()
             && options.appearance.is_none();
         if has_defaults {
             return Ok(());

@@ -272,7 +272,7 @@ impl NewRun {
         let source = request.episodes.as_ref();
         let episodes = source.map(|s| plan::read_source(s, &options)).transpose()?;
         let planned = plan::plan(&options, episodes.as_deref().unwrap_or_default())?;
-        if episodes.is_none() && options.partner_is.is_some() {
+        if episodes.is_none() && options.person.is_some() {
             plan::check_partner(&planned)?;
         }
         if let Some(name) = &options.partner

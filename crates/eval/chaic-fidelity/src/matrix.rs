@@ -118,7 +118,7 @@ impl Matrix {
             set: part.switch.iter().map(|rule| format!("{rule}=paper")).collect(),
             no_traces: part.switch.is_some(),
             partner: None,
-            partner_is: None,
+            person: None,
             appearance: None,
             perception: None,
             behavior: None,

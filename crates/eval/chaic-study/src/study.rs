@@ -82,12 +82,13 @@ impl Input {
 
 /// Behavior of the world while the person thinks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
 pub enum WorldPace {
-    /// The world waits.
-    Waits,
-    /// The world goes on.
-    GoesOn,
+    /// The world waits for each decision.
+    #[serde(rename = "waits")]
+    TurnBased,
+    /// The world goes on, and the person's agent stands still.
+    #[serde(rename = "goes_on")]
+    RealTime,
 }
 
 /// Place where the simulator runs while a person plays.
@@ -144,7 +145,7 @@ fn plans() -> Input {
 }
 
 fn waits() -> WorldPace {
-    WorldPace::Waits
+    WorldPace::TurnBased
 }
 
 fn one() -> u32 {

@@ -30,7 +30,7 @@ pub enum Appearance {
 impl FromStr for Appearance {
     type Err = String;
 
-    /// Parses `canonical`, `evening`, or `random_light_rig:SEED`.
+    /// Parses `canonical`, `evening`, or `varied:SEED`.
     fn from_str(text: &str) -> Result<Appearance, String> {
         match (text, text.strip_prefix("varied:").map(str::parse)) {
             ("canonical", _) => Ok(Appearance::Canonical),

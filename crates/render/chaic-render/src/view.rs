@@ -46,7 +46,7 @@ impl From<SensorConfig> for Channels {
 
 /// A camera and the channels that it renders.
 ///
-/// An invalid camera (not finite, or without a field of view) renders only background: sky, maximum
+/// An invalid camera (not finite, or without a field of view) renders nothing: black, maximum
 /// depth, no ids. A camera with a side over [`MAX_SIDE_PX`] gets no images.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {

@@ -111,12 +111,18 @@ fn header(line: &str, path: &Path) -> Result<Header> {
     let bad = |problem| EnvError::Unreadable { path: path.to_owned(), line: 1, problem };
     let v: Version = serde_json::from_str(line)
         .map_err(|e| bad(format!("is not the header of a trace: {e}")))?;
-    if v.format != FORMAT || !(MIN_VERSION..=VERSION).contains(&v.version) {
+    if v.format != FORMAT {
+        let found = v.format.escape_debug();
+        return Err(bad(format!("is not the header of a trace: its format is `{found}`")));
+    }
+    if !(MIN_VERSION..=VERSION).contains(&v.version) {
         return Err(EnvError::OtherVersion {
             path: path.to_owned(),
             found: format!("{} version {} (written by chaic {})", v.format, v.version, v.chaic),
             expected: format!("{FORMAT} versions {MIN_VERSION} to {VERSION}"),
         });
     }
-    serde_json::from_str(line).map_err(|e| bad(e.to_string()))
+    let header: Header = serde_json::from_str(line).map_err(|e| bad(e.to_string()))?;
+    header.rules.check().map_err(bad)?;
+    Ok(header)
 }

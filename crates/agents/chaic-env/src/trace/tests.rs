@@ -140,6 +140,24 @@ fn another_version_is_refused_with_its_number() {
 }
 
 #[test]
+fn another_format_and_impossible_rules_are_refused() {
+    let text = written();
+    let problem =
+        |text: &str| parse(text.as_bytes(), Path::new("t.jsonl")).unwrap_err().to_string();
+    let other = text.replacen("\"chaic-trace\"", "\"chaic-run\"", 1);
+    assert_ne!(other, text);
+    assert!(problem(&other).contains("its format is `chaic-run`"), "{}", problem(&other));
+    let mut wrong = [RuleSet::PAPER; 3];
+    wrong[0].world.turn_rad = 13.0;
+    wrong[1].world.durations.gap = u32::MAX;
+    wrong[2].world.durations.open_hand = 0;
+    for (rules, name) in wrong.into_iter().zip(["turn_rad", "gap", "open_hand"]) {
+        let line = serde_json::to_string(&Header { rules, ..header() }).unwrap();
+        assert!(problem(&(line + "\n")).contains(name), "{name}");
+    }
+}
+
+#[test]
 fn only_a_noncanonical_appearance_is_written() {
     let line = |appearance| serde_json::to_string(&Header { appearance, ..header() }).unwrap();
     let read = |line: &str| parse(format!("{line}\n").as_bytes(), Path::new("t.jsonl"));

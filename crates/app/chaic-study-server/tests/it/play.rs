@@ -19,7 +19,7 @@ const SIDE_PX: u32 = 64;
 /// Starts the session that a page would have for the first trial of the first slot.
 fn local(plan: &Plan, level: InputLevel) -> LiveSession {
     let trial = plan.trials(1)[0];
-    let is_live = plan.study().play.world == chaic_study::WorldPace::GoesOn;
+    let is_live = plan.study().play.world == chaic_study::WorldPace::RealTime;
     let is_helper = plan.study().play.seat == chaic_study::Seat::Helper;
     let seat = if is_helper { AgentId::HELPER } else { AgentId::PARTNER };
     let helper = if is_helper { "none" } else { plan.helper(trial) };

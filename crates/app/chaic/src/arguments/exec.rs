@@ -197,7 +197,7 @@ pub struct HelperCheckArguments {
 /// `chaic helper serve`.
 #[derive(Args, Debug)]
 pub struct HelperServeArguments {
-    /// Built-in helper: random, rhp, oracle or follow.
+    /// Built-in helper; `chaic list helpers` prints them.
     #[arg(value_name = "NAME")]
     pub name: String,
     /// Rule set: paper, or compat for the behavior of the original's code.
@@ -219,7 +219,8 @@ fn variable(text: &str) -> Result<String, String> {
 
 fn seconds(text: &str) -> Result<Duration, String> {
     let seconds = text.parse().ok().filter(|s| (0.001..=86_400.0).contains(s));
-    let seconds = seconds.ok_or_else(|| format!("no time `{text}`; write seconds, up to 86400"))?;
+    let seconds =
+        seconds.ok_or_else(|| format!("no time `{text}`; write seconds, from 0.001 to 86400"))?;
     Ok(Duration::from_secs_f64(seconds))
 }
 

@@ -71,7 +71,8 @@ fn list(split: &Split, tasks: &[TaskId], format: OutputFormat) -> Result<ExitSta
         }
         separator = ",\n";
     }
-    print("\n]\n")?;
+    let is_empty = separator == "[\n";
+    print(if is_empty { "[]\n" } else { "\n]\n" })?;
     Ok(ExitStatus::Success)
 }
 
@@ -118,12 +119,12 @@ fn show(argument: &str, out: &Path, width_px: u32, format: OutputFormat) -> Resu
 }
 
 fn generate(task: TaskId, split: &Split, out: &Path, format: OutputFormat) -> Result<ExitStatus> {
-    create_folders(out)?;
-    let stop = interrupt::stop_flag()?;
     let n = split.len_of(task);
     if n == 0 {
         bail!("{split} has no episodes of {task}, which is not the paper's; give --seeds");
     }
+    create_folders(out)?;
+    let stop = interrupt::stop_flag()?;
     let bar = bars::count_bar(n as u64, "episodes");
     for k in 0..n {
         if stop.load(Ordering::Relaxed) {

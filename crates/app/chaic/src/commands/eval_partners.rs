@@ -171,7 +171,7 @@ fn partner_arguments(
 }
 
 fn partner_request(request: &RunRequest, entry: &SuitePartner) -> RunRequest {
-    RunRequest { partner: entry.partner.clone(), partner_is: entry.person, ..request.clone() }
+    RunRequest { partner: entry.partner.clone(), person: entry.person, ..request.clone() }
 }
 
 /// Writes and prints the robustness report of complete runs.

@@ -213,7 +213,7 @@ pub(super) fn request(arguments: &EvalArguments) -> (RunRequest, &'static str) {
         set: set.clone(),
         no_traces: arguments.no_traces,
         partner: arguments.partner.clone(),
-        partner_is: arguments.person,
+        person: arguments.person,
         appearance: arguments.appearance,
         perception: arguments.perception(),
         behavior: arguments.behavior(),

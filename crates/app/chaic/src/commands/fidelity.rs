@@ -44,8 +44,8 @@ pub fn run(arguments: &FidelityArguments, format: OutputFormat) -> Result<ExitSt
         let parts = requested_parts(&request, &matrix);
         check_build(&matrix, &parts, stop)?;
         let is_complete = play(jobs, &parts, &matrix, stop);
-        if !is_complete.map_err(|e| anyhow!("{e:#}\n{}", how_to_resume(&arguments.out)))? {
-            print_error(&format!("stopped; {}", how_to_resume(&arguments.out)));
+        if !is_complete.map_err(|e| anyhow!("{e:#}\n{}", how_to_resume(arguments)))? {
+            print_error(&format!("stopped; {}", how_to_resume(arguments)));
             return Ok(ExitStatus::Interrupted);
         }
     }
@@ -197,7 +197,7 @@ fn finish(
     let json = json!({ "document": doc, "missing": missing, "failed": broken });
     print_result(format, &json, &format!("Document: {}\n", doc.display()))?;
     if missing > 0 {
-        let hint = how_to_resume(&arguments.out);
+        let hint = how_to_resume(arguments);
         print_warning(&format!("{missing} episode runs are missing; {hint}"));
     }
     if broken > 0 {
@@ -206,6 +206,8 @@ fn finish(
     Ok(ExitStatus::from_findings(missing + broken > 0))
 }
 
-fn how_to_resume(out: &Path) -> String {
-    format!("continue with: chaic fidelity --resume --out {}", quoted_path(out))
+fn how_to_resume(arguments: &FidelityArguments) -> String {
+    let doc = arguments.doc.as_deref().map(|doc| format!(" --doc {}", quoted_path(doc)));
+    let out = quoted_path(&arguments.out);
+    format!("continue with: chaic fidelity --resume --out {out}{}", doc.unwrap_or_default())
 }

@@ -85,7 +85,7 @@ fn options_text(options: &RunOptions, progress: &Progress, n_traces: usize) -> S
         Some(("Track", track.to_string())),
         optional("Images", size.map(|px| format!("{px} pixels"))),
         optional("Partner", options.partner.clone()),
-        optional("Person", options.partner_is.map(|kind| kind.to_string())),
+        optional("Person", options.person.map(|kind| kind.to_string())),
         optional("Perception", options.perception.clone()),
         optional("Behavior", options.behavior.clone()),
         optional("Appearance", options.appearance.clone()),

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use chaic_core::AgentId;
+use chaic_env::trace::TraceWarning;
 use chaic_episodes::find_episode;
 use chaic_eval::run::RunFolder;
 use chaic_eval::suite::SuiteFolder;
@@ -96,10 +97,15 @@ fn verify_file(path: &Path, format: OutputFormat) -> Result<ExitStatus> {
     let episode = find_episode(&trace.header.episode)?;
     let mismatch = verify(&trace, &episode, path)?;
     let decisions = trace.decisions().count();
-    let problem = mismatch.as_ref().map(ToString::to_string);
-    let text = match &problem {
-        Some(problem) => format!("DIFFERS {problem}\n"),
-        None => format!("{}: all digests agree\n", counted(decisions, "decision")),
+    let is_damaged = |warning: &&TraceWarning| matches!(warning, TraceWarning::Torn { .. });
+    let damage = warnings.iter().find(is_damaged).map(ToString::to_string);
+    let problem = mismatch.as_ref().map(ToString::to_string).or(damage);
+    let text = match (&problem, &mismatch) {
+        (Some(problem), Some(_)) => format!("DIFFERS {problem}\n"),
+        (Some(_), None) => {
+            format!("DAMAGED: the digests of {} agree\n", counted(decisions, "whole decision"))
+        }
+        (None, _) => format!("{}: all digests agree\n", counted(decisions, "decision")),
     };
     let json = json!({ "passed": problem.is_none(), "decisions": decisions, "problem": problem });
     print_result(format, &json, &text)?;

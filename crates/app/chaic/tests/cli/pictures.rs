@@ -67,6 +67,13 @@ fn a_page_to_play_and_single_traces() {
     fs::write(at.join("altered.jsonl"), altered).expect("written");
     let output = output_of(at, &["verify", "altered.jsonl"]);
     assert!(!output.status.success() && text(&output.stdout).contains("DIFFERS altered.jsonl"));
+    // Without its last bytes, a trace is damaged. Without its last line, it ends early, as that of a game.
+    let (last, _) = recorded.trim_end().rsplit_once('\n').expect("several lines");
+    fs::write(at.join("cut.jsonl"), &recorded[..recorded.len() - 5]).expect("written");
+    fs::write(at.join("short.jsonl"), format!("{last}\n")).expect("written");
+    let output = output_of(at, &["verify", "cut.jsonl", "--format", "json"]);
+    assert!(!output.status.success() && text(&output.stdout).contains("\"passed\": false"));
+    assert!(run_ok(at, &["verify", "short.jsonl"]).contains("all digests agree"));
     fs::write(at.join("foreign.jsonl"), "{}\n").expect("written");
     assert!(run_err(at, &["verify", "foreign.jsonl"]).contains("foreign.jsonl"));
 }
@@ -98,6 +105,8 @@ fn images_and_episode_files() {
     let json = run_ok(at, &["episodes", "list", "--task", "obstacle,shopping", "--format", "json"]);
     let json: serde_json::Value = serde_json::from_str(&json).expect("it is JSON");
     assert_eq!(json.as_array().map(Vec::len), Some(24));
+    let empty = ["episodes", "list", "--split", "standard", "--task", "tremor", "--format", "json"];
+    assert_eq!(run_ok(at, &empty), "[]\n");
     assert!(run_ok(at, &["episodes", "schema"]).contains("chaic-episode"));
 
     assert!(run_ok(at, &["episodes", "validate", file]).contains("fine"));

@@ -87,7 +87,7 @@ impl LeaderboardRow {
         difference: Option<RowDifference>,
     ) -> Option<LeaderboardRow> {
         let submission = &entry.score.submission;
-        let row = LeaderboardRow::reference(entry, &submission.name)?;
+        let row = LeaderboardRow::from_results(entry, &submission.name)?;
         Some(LeaderboardRow {
             release: submission.release.clone(),
             authors: submission.authors.clone(),
@@ -100,8 +100,8 @@ impl LeaderboardRow {
         })
     }
 
-    /// Returns the row of a built-in helper; `None` without results.
-    pub(super) fn reference(entry: &ConfirmedEntry, helper: &str) -> Option<LeaderboardRow> {
+    /// Returns the row of a helper with its scores alone; `None` without results.
+    pub(super) fn from_results(entry: &ConfirmedEntry, helper: &str) -> Option<LeaderboardRow> {
         let results = HelperResults { results: &entry.results, helper };
         let (tr, interval) = mean_rate(results, &entry.environments)?;
         let scores = entry.score.tasks.iter();

@@ -9,8 +9,8 @@ use crate::score::SubmissionRecord;
 
 const EVIL: &str = "</td><script>alert(1)</script>\"'&";
 
-fn rules(split: &str, track: &str) -> PlayRules {
-    PlayRules {
+fn rules(split: &str, track: &str) -> EvaluationConditions {
+    EvaluationConditions {
         chaic: "0.1.0".to_owned(),
         track: track.to_owned(),
         rules: "paper".to_owned(),
@@ -46,7 +46,7 @@ fn result(helper: &str, k: usize, done: u32) -> RunResult {
 }
 
 /// Returns an evaluation in which the helper delivers `rates` tenths per episode, and RHP 4 and 5.
-fn entry(name: &str, conditions: &PlayRules, rates: [u32; 6]) -> ConfirmedEntry {
+fn entry(name: &str, conditions: &EvaluationConditions, rates: [u32; 6]) -> ConfirmedEntry {
     let own = rates.iter().enumerate().map(|(k, done)| result(name, k, *done));
     let others = [(NONE, 1), ("rhp", 4)]
         .into_iter()
@@ -93,8 +93,8 @@ fn leaderboard(entries: Vec<ConfirmedEntry>) -> Leaderboard {
 #[test]
 fn rows_of_different_rules_are_in_different_tables() {
     let (told, hidden, other) = (rules("a", "told"), rules("a", "hidden"), rules("b", "told"));
-    let size = PlayRules { size: Some(64), ..told.clone() };
-    let version = PlayRules { chaic: "0.2.0".to_owned(), ..told.clone() };
+    let size = EvaluationConditions { size: Some(64), ..told.clone() };
+    let version = EvaluationConditions { chaic: "0.2.0".to_owned(), ..told.clone() };
     let all = [&told, &hidden, &other, &size, &version];
     let entries = all.iter().enumerate().flat_map(|(k, rules)| {
         [entry(&format!("m{k}"), rules, [5; 6]), entry(&format!("n{k}"), rules, [6; 6])]

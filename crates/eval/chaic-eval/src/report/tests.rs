@@ -50,7 +50,7 @@ fn options() -> RunOptions {
         set: vec![],
         traces: true,
         partner: None,
-        partner_is: None,
+        person: None,
         appearance: None,
         perception: None,
         behavior: None,

@@ -208,9 +208,8 @@ impl Report<'_> {
 
     /// Returns the heading, with the options of the run.
     fn heading(&self) -> String {
-        let RunOptions {
-            split, first, seeds, size, rules, set, partner, partner_is, track, ..
-        } = self.options;
+        let RunOptions { split, first, seeds, size, rules, set, partner, person, track, .. } =
+            self.options;
         let track =
             if *track == Track::default() { String::new() } else { format!(" Track: `{track}`.") };
         let episodes = first.map_or("all".to_owned(), |n| format!("first {n}"));
@@ -221,7 +220,7 @@ impl Report<'_> {
         };
         let driven = partner.as_ref();
         let driven = driven.map_or(String::new(), |p| format!(" The partner is driven by `{p}`."));
-        let person = partner_is.map_or(String::new(), |k| format!(" The partner is `{k}`."));
+        let person = person.map_or(String::new(), |k| format!(" The partner is `{k}`."));
         format!(
             "# chaic run\n\nchaic {CHAIC_VERSION}, rules `{played_by}`, formulas `{}`. Split `{split}`, \
              {episodes} episodes of each task, seeds per episode: {seeds}. Images: {size}.{driven}{person}{track}\n\n",

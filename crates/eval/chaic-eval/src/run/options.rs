@@ -50,8 +50,8 @@ pub struct RunOptions {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub partner: Option<String>,
     /// Change of the partner's body; absent for the person in each episode.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub partner_is: Option<PersonChange>,
+    #[serde(rename = "partner_is", default, skip_serializing_if = "Option::is_none")]
+    pub person: Option<PersonChange>,
     /// Light and colors of scenes; absent for the benchmark's default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub appearance: Option<String>,
@@ -109,7 +109,7 @@ pub struct RunRequest {
     /// `--partner`.
     pub partner: Option<String>,
     /// `--person`.
-    pub partner_is: Option<PersonChange>,
+    pub person: Option<PersonChange>,
     /// `--appearance`.
     pub appearance: Option<Appearance>,
     /// `--perception`.
@@ -161,7 +161,7 @@ impl RunOptions {
             option("set", Some(setting.clone()));
         }
         option("partner", self.partner.clone());
-        option("person", self.partner_is.map(|kind| kind.to_string()));
+        option("person", self.person.map(|kind| kind.to_string()));
         option("appearance", self.appearance.clone());
         option("perception", self.perception.clone());
         option("behavior", self.behavior.clone());
@@ -231,7 +231,7 @@ impl RunRequest {
             set,
             traces,
             partner,
-            partner_is: self.partner_is,
+            person: self.person,
             appearance: appearance.map(|a| a.to_string()),
             perception: self.perception.clone().filter(|name| name != GROUND_TRUTH),
             behavior: self.behavior.clone().filter(|name| name != GROUND_TRUTH),
@@ -281,8 +281,8 @@ impl RunRequest {
             ),
             (
                 "--person",
-                self.partner_is.map(|k| k.to_string()),
-                recorded.partner_is.map_or("not given".to_owned(), |k| k.to_string()),
+                self.person.map(|k| k.to_string()),
+                recorded.person.map_or("not given".to_owned(), |k| k.to_string()),
             ),
             (
                 "--appearance",

@@ -154,7 +154,7 @@ fn episodes(
     let horizon = task.info().horizon;
     let n = split.len_of(task).min(limit);
     check_count(n, max, task)?;
-    let partner = options.partner_is.map_or_else(String::new, |kind| format!("/{kind}"));
+    let partner = options.person.map_or_else(String::new, |kind| format!("/{kind}"));
     let plan = |k: usize| EpisodePlan {
         id: split.episode_id(task, k) + &partner,
         horizon,
@@ -222,7 +222,7 @@ fn read_with_partner(source: &Path, options: &RunOptions) -> Result<Vec<Episode>
     let episodes = read_episode_files(source)?.into_iter();
     let selected = episodes.filter(|e| options.tasks.contains(&e.task()));
     selected
-        .map(|episode| match options.partner_is {
+        .map(|episode| match options.person {
             Some(kind) => Ok(episode.with_partner(kind)?),
             None => Ok(episode),
         })

@@ -26,7 +26,7 @@ impl SuiteFolder {
         for run in runs {
             let expected = ordinary.map(|options| RunOptions {
                 partner: run.partner.partner.clone(),
-                partner_is: run.partner.person,
+                person: run.partner.person,
                 ..options.clone()
             });
             if expected.as_ref() != Some(&run.options) {

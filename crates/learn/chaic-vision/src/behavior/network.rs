@@ -121,7 +121,7 @@ impl TrainedBehavior {
     }
 
     /// Returns the logits of [`CROPS`] crops.
-    pub fn outputs(&self, crops: &[PersonCrop], first: usize, pass: &mut Pass) -> Outputs {
+    pub fn outputs(&self, crops: &[PersonCrop], first: usize, pass: &mut Pass) -> BehaviorScores {
         let mut input = Tensor::zeros(BehaviorNetwork::input_shape(1));
         fill_input(crops, &ClipAugmentation::identity(first), &mut input.data);
         pass.forward(&self.network.network, &self.parameters, &input);
@@ -130,17 +130,17 @@ impl TrainedBehavior {
     }
 
     /// Returns the probability of each behavior.
-    pub fn probabilities(&self, outputs: &Outputs) -> Outputs {
-        softmax(&outputs.map(|x| self.inverse_temperature * x))
+    pub fn probabilities(&self, logits: &BehaviorScores) -> BehaviorScores {
+        softmax(&logits.map(|x| self.inverse_temperature * x))
     }
 }
 
-/// One value per behavior.
-pub type Outputs = [f32; Behavior::ALL.len()];
+/// One value per behavior: logits or probabilities.
+pub type BehaviorScores = [f32; Behavior::ALL.len()];
 
-/// Softmax.
-pub fn softmax(outputs: &Outputs) -> Outputs {
-    let mut probabilities = *outputs;
+/// Returns the probabilities of logits.
+pub fn softmax(logits: &BehaviorScores) -> BehaviorScores {
+    let mut probabilities = *logits;
     crate::loss::softmax(&mut probabilities);
     probabilities
 }

@@ -94,8 +94,8 @@ pub struct LearnedBehavior {
     n_new: usize,
     /// Interactions inferred from tracks of held objects.
     inferred: InferredBehavior,
-    /// Recognized behaviors with their objects.
-    recognized: Vec<(Behavior, ObservedInteraction)>,
+    /// Recognized interactions with known objects.
+    recognized: Vec<ObservedInteraction>,
     /// Last recognized behavior, with or without a known object.
     last: Option<(Behavior, Frame)>,
     log: BehaviorLog,
@@ -223,8 +223,9 @@ impl LearnedBehavior {
                     .iter()
                     .any(|a| a.action.subject() == recognized.action.subject())
         };
-        let recognized = self.recognized.iter().map(|(_, recognized)| recognized);
-        log.actions.extend(recognized.filter(|recognized| !is_inferred(recognized)).copied());
+        let only_recognized =
+            self.recognized.iter().filter(|interaction| !is_inferred(interaction));
+        log.actions.extend(only_recognized.copied());
         log.actions.sort_by_key(|action| action.frame);
         log
     }
@@ -248,7 +249,7 @@ impl BehaviorModel for LearnedBehavior {
                 let agent = self.person;
                 let recognized =
                     ObservedInteraction { agent, frame, action, outcome: Some(outcome) };
-                self.recognized.push((behavior, recognized));
+                self.recognized.push(recognized);
             }
         }
         self.log = self.merge();

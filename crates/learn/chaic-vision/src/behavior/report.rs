@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::Behavior;
 use super::clip::{Clip, SLACK};
-use super::network::{Outputs, TrainedBehavior, softmax};
+use super::network::{BehaviorScores, TrainedBehavior, softmax};
 use crate::parallel::map_in_order;
 
 const N: usize = Behavior::ALL.len();
@@ -38,7 +38,7 @@ pub fn all_outputs(
     clips: &[Clip],
     n_threads: usize,
     stop: &AtomicBool,
-) -> Option<Vec<Outputs>> {
+) -> Option<Vec<BehaviorScores>> {
     map_in_order(
         0..clips.len(),
         n_threads,
@@ -49,7 +49,7 @@ pub fn all_outputs(
 }
 
 /// Returns the most probable behavior and its probability.
-pub fn most_probable(probabilities: &Outputs) -> (Behavior, f32) {
+pub fn most_probable(probabilities: &BehaviorScores) -> (Behavior, f32) {
     let probability = |b: &Behavior| probabilities[b.index()];
     let best = Behavior::ALL.into_iter().max_by(|a, b| probability(a).total_cmp(&probability(b)));
     best.map_or((Behavior::Moving, 0.0), |best| (best, probability(&best)))
@@ -100,9 +100,9 @@ pub fn report(
 
 /// Returns the inverse temperature that maximizes the likelihood of the labels, by golden-section
 /// search.
-pub fn calibrate(clips: &[Clip], outputs: &[Outputs]) -> f32 {
+pub fn calibrate(clips: &[Clip], outputs: &[BehaviorScores]) -> f32 {
     let loss = |inverse_temperature: f32| -> f64 {
-        let clip_loss = |(clip, o): (&Clip, &Outputs)| {
+        let clip_loss = |(clip, o): (&Clip, &BehaviorScores)| {
             let p = softmax(&o.map(|x| inverse_temperature * x))[clip.label.index()];
             -f64::from(crate::loss::ln(p.max(1e-6)))
         };

@@ -21,7 +21,7 @@ use super::Behavior;
 use super::clip::{Clip, ClipAugmentation, fill_input};
 use super::collect::{Collector, Counts, collect};
 use super::config::{COLLECT_BOUNDS, ClipCollectionConfig};
-use super::network::{BehaviorNetwork, Outputs, TrainedBehavior, softmax};
+use super::network::{BehaviorNetwork, BehaviorScores, TrainedBehavior, softmax};
 use super::report::{all_outputs, calibrate, report};
 use super::store::ClipFolder;
 use crate::loss::ln;
@@ -319,7 +319,7 @@ fn loss(logits: &[f32], clips: &[&Clip], smoothing: f32, gradient: &mut [f32]) -
     let mut metrics = BehaviorMetrics::default();
     let rows = logits.as_chunks::<N>().0.iter().zip(gradient.as_chunks_mut::<N>().0);
     for ((outputs, gradient), clip) in rows.zip(clips) {
-        let p: Outputs = softmax(outputs);
+        let p: BehaviorScores = softmax(outputs);
         let target = clip.label.index();
         metrics.loss -= f64::from(scale * ln(p[target].max(1e-9)));
         metrics.accuracy +=

@@ -216,6 +216,8 @@ export class ChaicPlay extends LitElement {
   private focusChoices(): void {
     const focused = document.activeElement;
     if (focused !== document.body && focused !== this) return;
+    const within = this.shadowRoot?.activeElement;
+    if (within && !within.closest(".plans")) return;
     this.shadowRoot?.querySelector<HTMLButtonElement>(".plans button")?.focus();
   }
 

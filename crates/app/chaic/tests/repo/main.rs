@@ -1,8 +1,11 @@
-//! Checks of the repository itself: dependencies, licenses, imports, prose, citations, links and published tables.
+//! Checks of the repository itself: dependencies, their features, licenses, imports, prose, citations,
+//! links and published tables.
 
 mod citations;
 mod cycles;
 mod docs;
+#[cfg(target_os = "linux")]
+mod features;
 mod layers;
 mod licenses;
 mod prose;

@@ -80,10 +80,8 @@ class EpisodeSource:
     ) -> tuple[Episode, int]:
         """Returns the episode and seed in the options of a reset; draws those that the options do not contain.
 
-        Raises ``ValueError`` for other options.
+        Other options have no effect, as PettingZoo's test of environments requires.
         """
-        if unknown := set(options or ()) - {"episode", "seed"}:
-            raise ValueError(f"no reset option {sorted(unknown)}; the options are episode and seed")
         episode, seed = self.draw(rng)
         if options is not None and "episode" in options:
             episode, seed = self.get(options["episode"]), 0

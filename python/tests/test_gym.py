@@ -237,5 +237,3 @@ def test_a_caller_may_change_what_it_gets():
         observation, _, terminated, truncated, info = env.step(first)
         ended = terminated or truncated
     assert env.observation_space.contains(observation)
-    with pytest.raises(ValueError, match="episode and seed"):
-        env.reset(options={"reset_mask": [True]})

@@ -144,6 +144,21 @@ test("a participation by keyboard alone gives data that verify", async () => {
 
 const digest = (text) => JSON.parse(text.split("\n")[0]).study.slice(0, 8);
 
+test("a second click has no effect", async () => {
+  const { page, context } = await open("#2");
+  const clickTwice = (name) =>
+    page.getByRole("button", { name }).evaluate((button) => {
+      button.click();
+      button.click();
+    });
+  await clickTwice(/^I agree/);
+  await heading(page, "Instructions");
+  await clickTwice("Continue");
+  await heading(page, /^Episode 1 of 3, practice$/);
+  assert.deepEqual((await records(page)).map((record) => record.type), ["start", "instructed"]);
+  await context.close();
+});
+
 test("a reload loses nothing and goes on at the checkpoint", async () => {
   const { page, context } = await open("#1");
   await page.getByRole("button", { name: "I agree" }).click();

@@ -199,6 +199,8 @@ test("an altered trace is shown up to the frame that differs", async () => {
   writeFileSync(trace, lines.join("\n"));
   const altered = join(folder, "altered.html");
   execFileSync(chaic, ["view", run, "--helper", "none", "--out", altered]);
+  const comparison = join(folder, "altered-comparison.html");
+  execFileSync(chaic, ["view", run, "low_target/test/00", "--out", comparison]);
   writeFileSync(trace, original);
   const { page } = await open(altered);
   await shown(page);
@@ -206,6 +208,12 @@ test("an altered trace is shown up to the frame that differs", async () => {
   const problem = await page.locator("chaic-replay [role=alert]").innerText();
   assert.match(problem, /Shown up to frame \d+ of \d+/);
   await page.close();
+  const compared = await open(comparison, "#0+1@0");
+  await shown(compared.page);
+  const alerts = await compared.page.locator("chaic-compare [role=alert]").allInnerTexts();
+  assert.equal(alerts.length, 1, "one of both traces is altered");
+  assert.match(alerts[0], /Shown up to frame \d+ of \d+/);
+  await compared.page.close();
 });
 
 test("a damaged page says what is wrong", async () => {
@@ -340,6 +348,7 @@ test("a game of one switch ends with the results of the built-in helpers", async
   await page.getByLabel("Speed").selectOption("8");
   await page.getByRole("button", { name: "Start" }).click();
   await page.getByLabel(/for a single switch/).check();
+  await page.getByLabel("Time for each choice").selectOption("1");
   const offers = (wanted) =>
     page.waitForFunction(
       (index) => {
@@ -359,6 +368,18 @@ test("a game of one switch ends with the results of the built-in helpers", async
   await page.close();
 });
 
+test("a new turn leaves the focus on other controls of the game", async () => {
+  const { page } = await open(shortGame("focus.html", 2000));
+  await page.getByLabel("Speed").selectOption("8");
+  await page.getByRole("button", { name: "Start" }).click();
+  await page.waitForFunction(() => document.querySelector("chaic-play")?.shown?.status === "waiting");
+  await page.getByRole("button", { name: "Stop here" }).focus();
+  await playTo(page, 200);
+  const focused = await page.evaluate(() => document.querySelector("chaic-play").shadowRoot.activeElement?.textContent);
+  assert.equal(focused, "Stop here");
+  await page.close();
+});
+
 test("a game of steps obeys the keys, and its world goes on if it is live", async () => {
   const { page } = await open(shortGame("steps.html", 2000));
   await page.getByLabel("You choose").selectOption("steps");
@@ -370,6 +391,12 @@ test("a game of steps obeys the keys, and its world goes on if it is live", asyn
   await page.locator("chaic-play .controls button").first().focus();
   await page.keyboard.press("ArrowLeft");
   await page.waitForFunction(() => document.querySelector("chaic-play").shown.caption.action === "turns left");
+  await page.waitForFunction(() => document.querySelector("chaic-play").shown.status === "waiting");
+  // The plan has become impossible between its display and its choice.
+  await page.evaluate(() => (document.querySelector("chaic-play").input = { plan: "fly" }));
+  await page.getByText("Your last choice was no longer possible").waitFor();
+  await page.keyboard.press("ArrowLeft");
+  await page.getByText("Your last choice was no longer possible").waitFor({ state: "detached" });
   await page.getByLabel("While you think").selectOption("live");
   await page.getByRole("button", { name: "Start" }).click();
   await page.waitForFunction(() => document.querySelector("chaic-play")?.shown?.frame > 20);
@@ -384,6 +411,13 @@ test("a person takes over from a frame of a replay", async () => {
   await playTo(page, 400);
   const trace = await verified(page, "branch.jsonl");
   assert.match(trace, /"partner":"human"/);
+  const choice = page.locator("#choice");
+  await page.getByRole("button", { name: "Watch the replay" }).click();
+  await shown(page);
+  assert.equal(await choice.inputValue(), "", "it is no replay of the page");
+  await choice.selectOption("0");
+  await shown(page);
+  assert.equal(await page.evaluate(() => document.querySelector("chaic-replay").frame), 0);
   await page.close();
 });
 

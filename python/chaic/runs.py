@@ -86,8 +86,9 @@ def evaluate(
     """Plays a benchmark with Python helpers into the folder ``out``, and returns the run.
 
     ``helper`` is a class (``Helper``), a ``functools.partial`` of one, or another callable that creates a helper for each
-    episode, or several of them by name; all must request the same grants and images, as attributes of the callable. ``n_episodes`` limits the episodes of each task. ``baselines`` names
-    built-in helpers for comparison; EI needs ``"none"``. ``jobs`` episodes run in parallel (default: one per core); their
+    episode, or several of them by name. All must request the same grants and images, as attributes of the callable.
+    ``n_episodes`` limits the episodes of each task. ``baselines`` names built-in helpers for comparison; EI needs
+    ``"none"``. ``jobs`` episodes run in parallel (default: one per core); their
     Python helpers share the interpreter lock. Further options are those of ``chaic eval``: ``episodes``, ``rules``, ``set``,
     ``traces``, ``perception``, ``behavior``, ``track``. ``track="hidden"`` refuses all grants except ``goal_place``.
     ``chaic report``, ``chaic verify`` and ``chaic replay`` read the folder.

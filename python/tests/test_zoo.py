@@ -5,6 +5,7 @@ import warnings
 import numpy as np
 import pytest
 
+import chaic
 from chaic import zoo
 
 OPTIONS = {"image_size": 32, "observation": ("rgb", "own")}
@@ -40,6 +41,19 @@ def test_max_cycles_truncates_an_episode():
             return zoo.parallel_env("obstacle", **OPTIONS, **options)
 
     max_cycles_test(Module)
+
+
+def test_no_reward_is_lost_when_an_agent_ends_early():
+    env = zoo.env("obstacle", max_cycles=4, reward={"invalid": 1.0, "progress_per_m": 0.0}, **OPTIONS)
+    env.reset(seed=1)
+    total = dict.fromkeys(zoo.AGENTS, 0.0)
+    # The helper has ended while the partner still tries to use its empty hands.
+    rows = {"partner": [chaic.ACTIONS.index("put_in"), 0, 0], "helper": [chaic.ACTIONS.index("turn_left"), 0, 0]}
+    for agent in env.agent_iter(max_iter=60):
+        _, reward, terminated, truncated, _ = env.last()
+        total[agent] += reward
+        env.step(None if terminated or truncated else np.array(rows[agent]))
+    assert total == {"partner": -4.0, "helper": 0.0}
 
 
 def test_the_agent_whose_action_ended_is_next():

@@ -205,6 +205,8 @@ export interface LiveState {
   plans: string[];
   hands: [string | null, string | null];
   failure: string | null;
+  /** True if the person's last decision could not be taken. */
+  is_refused: boolean;
   caption: { action: string; plan: string };
   /** Achieved and total value of the goal; null for a person who helps, until the end. */
   progress: [number, number] | null;

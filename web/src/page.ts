@@ -91,6 +91,17 @@ class Replays {
     this.player.replaceChildren(this.element);
   }
 
+  /** Shows a replay that is not among those of the page. */
+  showOther(element: ChaicReplay): void {
+    clearTimeout(this.pending);
+    this.shown = undefined;
+    this.element = undefined;
+    this.choice.selectedIndex = -1;
+    this.other.replaceChildren();
+    this.other.disabled = true;
+    this.player.replaceChildren(element);
+  }
+
   private isChosen({ replay, other }: Shown): boolean {
     return this.shown?.replay === replay && this.shown.other === other;
   }
@@ -123,6 +134,8 @@ class Replays {
   }
 }
 
+let replays: Replays | undefined;
+
 /** Creates the element of a replay, from which a person can take over. */
 function replayElement(source: Source, start: number): ChaicReplay {
   const element = document.createElement("chaic-replay") as ChaicReplay;
@@ -145,7 +158,8 @@ async function play(
   const module = await moduleBytes();
   const watch = ({ trace }: GameResult): void => {
     const element = replayElement({ module, trace: encoder.encode(trace), episode }, 0);
-    document.getElementById("player")!.replaceChildren(element);
+    if (replays) replays.showOther(element);
+    else document.getElementById("player")!.replaceChildren(element);
     element.scrollIntoView();
   };
   await startGame(place, { module, workerSource: workerSource(), episode, config, pace, branch }, watch);
@@ -177,7 +191,8 @@ async function main(): Promise<void> {
   const other = document.querySelector<HTMLSelectElement>("#other");
   const player = document.querySelector("#player");
   if (!choice || !other || !player) return;
-  await new Replays(contents, choice, other, player).show(address());
+  replays = new Replays(contents, choice, other, player);
+  await replays.show(address());
 }
 
 function fail(problem: unknown): void {

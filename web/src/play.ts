@@ -2,6 +2,7 @@
 
 import { html, LitElement, nothing, type PropertyValues, type TemplateResult } from "lit";
 import { property, query, state } from "lit/decorators.js";
+import { repeat } from "lit/directives/repeat.js";
 import { clock } from "./frames.js";
 import type {
   Action,
@@ -15,7 +16,7 @@ import type {
   StoryLine,
 } from "./messages.js";
 import { drawnSize, MAX_PX, paint } from "./pictures.js";
-import { SCAN_MS } from "./study/scanner.js";
+import { Scanner } from "./scanner.js";
 import { styles } from "./styles.js";
 
 /** Side of the images in which a person points at objects, pixels. */
@@ -65,8 +66,6 @@ export class ChaicPlay extends LitElement {
   @state() private story: StoryLine[] = [];
   @state() private problem?: string;
   @state() private references = new Map<string, number>();
-  /** True if plans are offered one after the other. */
-  @state() private isScanning = false;
   /** What a click on the picture does. */
   @state() private pointing: { kind: "pick_up" | "put_on" | "remove_obstacle"; hand: Hand } = {
     kind: "pick_up",
@@ -82,7 +81,7 @@ export class ChaicPlay extends LitElement {
   private input?: { plan: string } | { action: Action };
   private lastTime = 0;
   private elapsedFrames = 0;
-  private scanTimer = 0;
+  private readonly scanner = new Scanner(this, () => this.choices());
   /** Length of the trace that a study has, characters. */
   private recordedLength = 0;
   private recordedFrame = 0;
@@ -101,9 +100,8 @@ export class ChaicPlay extends LitElement {
   private close(): void {
     this.simulator?.close();
     this.simulator = undefined;
-    clearInterval(this.scanTimer);
+    this.scanner.stop();
     this.info = this.shown = this.problem = undefined;
-    this.isScanning = false;
     this.story = [];
     this.references = new Map();
     this.isOver = false;
@@ -295,18 +293,9 @@ export class ChaicPlay extends LitElement {
     event.preventDefault();
   }
 
-  /** Focuses one plan after the other, so that users of a single switch only press Enter. */
-  private scan(isOn: boolean): void {
-    clearInterval(this.scanTimer);
-    this.isScanning = isOn;
-    if (isOn) this.scanTimer = window.setInterval(() => this.focusNext(), SCAN_MS);
-  }
-
-  private focusNext(): void {
-    const root = this.shadowRoot!;
-    const buttons = [...root.querySelectorAll<HTMLButtonElement>(".plans button")];
-    const focused = buttons.findIndex((button) => button === root.activeElement);
-    buttons[(focused + 1) % buttons.length]?.focus();
+  /** Returns what a person with one switch can choose: the plans, the end of the game, and to go on without the switch. */
+  private choices(): HTMLElement[] {
+    return [...this.shadowRoot!.querySelectorAll<HTMLElement>(".plans button, button.link, input.scan")];
   }
 
   override render(): TemplateResult {
@@ -361,30 +350,22 @@ export class ChaicPlay extends LitElement {
         ${this.time(shown.frame)} of ${this.time(shown.horizon)}${delivered}
       </p>
       <p>Left hand: ${hands[0]}; right hand: ${hands[1]}</p>
-      <p role="status">You: ${action}${plan ? ` (${plan})` : ""}${shown.failure ? `; failed: ${shown.failure}` : ""}</p>`;
+      <p role="status">You: ${action}${plan ? ` (${plan})` : ""}${shown.failure ? `; failed: ${shown.failure}` : ""}</p>
+      <p role="status">${shown.is_refused ? "Your last choice was no longer possible. Choose again." : ""}</p>`;
   }
 
   private plans(shown: LiveState | undefined): TemplateResult {
     return html`<h3>What next?</h3>
       <ol class="plans">
-        ${(shown?.plans ?? []).map(
+        ${repeat(
+          shown?.plans ?? [],
+          (plan) => plan,
           (plan, k) =>
             html`<li><button type="button" @click=${() => this.choose(k)}>${plan}</button></li>`,
         )}
       </ol>
       ${shown?.status === "running" ? html`<p>Doing it ...</p>` : nothing}
-      ${this.game?.isStudy ? nothing : this.scanChoice()}`;
-  }
-
-  private scanChoice(): TemplateResult {
-    return html`<label>
-        <input
-          type="checkbox"
-          .checked=${this.isScanning}
-          @change=${(event: Event) => this.scan((event.target as HTMLInputElement).checked)}
-        />
-        Offer one plan after the other, for a single switch
-      </label>`;
+      ${this.game?.isStudy ? nothing : this.scanner.controls("Offer one plan after the other, for a single switch")}`;
   }
 
   private steps(shown: LiveState | undefined): TemplateResult {

@@ -140,7 +140,7 @@ export class ChaicReplay extends LitElement {
     </section>`;
   }
 
-  /** What the whole replay must be known for. */
+  /** Controls, timeline and lists, which need the whole replay. */
   private details(info: ReplayInfo): TemplateResult {
     return html`${controls(this.playback, info.last_frame, info.frames_per_second, this.status(info))}
       ${this.layers.choice(info)} ${this.layers.words(info)}

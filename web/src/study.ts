@@ -7,6 +7,7 @@ import { query, state } from "lit/decorators.js";
 import { keyed } from "lit/directives/keyed.js";
 import { embedded, moduleBytes, workerSource } from "./embedded.js";
 import "./play.js";
+import { Scanner } from "./scanner.js";
 import type { Response, Simulator } from "./messages.js";
 import type { ChaicPlay, Game } from "./play.js";
 import {
@@ -22,7 +23,6 @@ import {
 import "./study/form.js";
 import type { ChaicForm } from "./study/form.js";
 import { lock, StudyLog, type Identity } from "./study/log.js";
-import { Scanner } from "./study/scanner.js";
 import { drawToken, Participant, Upload } from "./study/server.js";
 import { ServerSimulator } from "./study/simulator.js";
 import { paragraphs } from "./study/text.js";
@@ -49,7 +49,6 @@ export class ChaicStudy extends LitElement {
   /** State of the current trial. */
   @state() private playing: "before" | "running" | "over" = "before";
   @state() private isResumed = false;
-  @state() private isScanning = false;
   @state() private hasLeft = false;
   /** True while a step is stored. */
   private isChanging = false;
@@ -71,7 +70,9 @@ export class ChaicStudy extends LitElement {
   private participant?: Participant;
   /** True while an episode waits for the connection to the server. */
   @state() private isConnectionLost = false;
-  private readonly scanner = new Scanner(() => this.choices());
+  /** True if the server did not send the data. */
+  @state() private hasDownloadFailed = false;
+  private readonly scanner = new Scanner(this, () => this.choices());
 
   protected override createRenderRoot(): HTMLElement {
     return this;
@@ -125,7 +126,8 @@ export class ChaicStudy extends LitElement {
     const [start] = log.records;
     if (identity.isLeaving) {
       this.hasLeft = true;
-      void this.deleteEverywhere(log, identity);
+      this.waits = "deletion";
+      void this.deleteEverywhere(log, identity).then(() => (this.waits = undefined));
     } else if (start?.type !== "start") {
       void this.enter(log, identity);
     } else {
@@ -242,22 +244,22 @@ export class ChaicStudy extends LitElement {
     this.log = undefined;
     this.entering = undefined;
     this.hasLeft = true;
+    this.waits = "deletion";
     entering?.participant.abort();
     upload?.stop();
     const identity = await log?.readIdentity();
     this.focusHeading();
     if (log && identity) await this.deleteEverywhere(log, identity);
     else await log?.delete();
+    this.waits = undefined;
   }
 
   /** Deletes the data in this browser, then those on the server. A reload goes on with what is left. */
   private async deleteEverywhere(log: StudyLog, identity: Identity): Promise<void> {
-    this.waits = "deletion";
     await log.setIdentity({ ...identity, isLeaving: true });
     await log.clear();
     await new Participant(identity).delete();
     await log.delete();
-    this.waits = undefined;
   }
 
   /** Removes the copy in this browser after the end, for example before the next participant. */
@@ -329,6 +331,7 @@ export class ChaicStudy extends LitElement {
   /** Saves the data. Those with traces are on the server if it simulates. */
   private async download(): Promise<void> {
     const file = this.isSimulatedByServer() ? await this.participant?.data() : this.log?.toText();
+    this.hasDownloadFailed = file === undefined;
     if (file === undefined) return;
     const link = document.createElement("a");
     link.href = URL.createObjectURL(new Blob([file], { type: "application/jsonl" }));
@@ -383,15 +386,8 @@ export class ChaicStudy extends LitElement {
   }
 
   private bar(): TemplateResult {
-    const scan = (event: Event): void => {
-      this.isScanning = (event.target as HTMLInputElement).checked;
-      this.scanner.set(this.isScanning);
-    };
     return html`<div class="bar" role="group" aria-label="Study">
-      <label title="Offers one choice after the other; Enter or space takes it">
-        <input type="checkbox" .checked=${this.isScanning} @change=${scan} />
-        One switch
-      </label>
+      ${this.scanner.controls("One switch: offers one choice after the other")}
       <button type="button" id="leave" ?disabled=${this.hasLeft} @click=${() => this.dialog?.showModal()}>
         Stop and delete
       </button>
@@ -418,9 +414,7 @@ export class ChaicStudy extends LitElement {
     if (!content || this.isLoading) return this.problem ? html`` : html`<p role="status">Loading ...</p>`;
     if (this.hasLeft) {
       return html`${this.heading("You have stopped")}
-        ${this.waits === "deletion"
-          ? html`<p>The server has not confirmed the deletion yet. Keep this page open, or open it again later.</p>`
-          : html`<p>All your data ${this.places()} are deleted. You may close this page.</p>`}`;
+        <p role="status">${this.deletion(content)}</p>`;
     }
     switch (this.waits) {
       case "entry":
@@ -446,6 +440,13 @@ export class ChaicStudy extends LitElement {
       case "debrief":
         return this.debrief(content);
     }
+  }
+
+  /** Says how far the deletion of all data is. */
+  private deletion({ server }: StudyContent): string {
+    if (this.waits !== "deletion") return `All your data ${this.places()} are deleted. You may close this page.`;
+    if (!server) return "Your data are being deleted. Keep this page open.";
+    return "The server has not confirmed the deletion yet. Keep this page open, or open it again later.";
   }
 
   private heading(text: string): TemplateResult {
@@ -534,6 +535,7 @@ export class ChaicStudy extends LitElement {
       <p>
         <button type="button" @click=${() => void this.download()}>Download your data</button>
       </p>
+      <p role="status">${this.hasDownloadFailed ? "There is no connection to the server. Try again later." : ""}</p>
       <p class="small">The file has your answers and your decisions. It has no name, no address and no times of day.
         "Stop and delete" removes ${content.server ? "all your data, also on the server" : "the copy in this browser"}.</p>
       ${this.upload ? this.uploaded(this.upload) : nothing}`;

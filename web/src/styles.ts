@@ -310,7 +310,6 @@ export const styles = css`
   }
   .bar.walk {
     height: 0.625rem;
-    opacity: 0.45;
   }
   .bar.interact {
     height: 1.25rem;
@@ -360,7 +359,6 @@ export const styles = css`
   }
   .key.walk {
     height: 0.5rem;
-    opacity: 0.5;
   }
   .key.interact {
     height: 1rem;

@@ -24,6 +24,25 @@ pub trait PerceptionFactory: Send + Sync {
     /// Returns the grants of an agent that uses this perception instead of ground-truth ids.
     fn grants(&self, requested: Grants) -> Grants;
 
+    /// Width and height of images must be multiples of this, pixels.
+    fn image_step(&self) -> u32 {
+        1
+    }
+
+    /// Checks the side of square images, pixels.
+    ///
+    /// # Errors
+    /// If the perception cannot read images of this size.
+    fn check_image_size(&self, size: u32) -> Result<(), String> {
+        let step = self.image_step();
+        if size.is_multiple_of(step) {
+            return Ok(());
+        }
+        Err(format!(
+            "this perception needs an image size that is a multiple of {step}, not {size} pixels"
+        ))
+    }
+
     /// Creates the perception of one agent.
     fn perception(&self) -> Box<dyn Perception>;
 

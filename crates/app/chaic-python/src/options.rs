@@ -96,6 +96,7 @@ impl Options {
         };
         if let Some(size) = options.partner_image_size {
             self::sensors(&[], size)?;
+            options.perception.check_image_size(size).map_err(mistake)?;
         }
         if options.sensors.ids && !options.grants.ids {
             return Err(mistake("images of ids need the grant \"ids\""));

@@ -160,6 +160,7 @@ impl Planner {
     fn new(perception: &str, image_size: u32, behavior: &str) -> PyResult<Planner> {
         let perception = self::perception(perception, behavior)?;
         sensors(&[], image_size)?;
+        perception.check_image_size(image_size).map_err(mistake)?;
         let policy = ExternalPolicy::default();
         let agent = CorePlanningAgent::with_perception(policy, planner_rules(), &*perception);
         let sensors = SensorConfig { image_size, ..agent.sensors() };

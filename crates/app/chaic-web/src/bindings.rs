@@ -126,7 +126,7 @@ impl Live {
     /// If one of them is unreadable, or an agent does not exist.
     #[wasm_bindgen(constructor)]
     pub fn new(episode: &[u8], config: &str) -> Result<Live, JsError> {
-        let config = serde_json::from_str(config).map_err(error)?;
+        let config = serde_json::from_slice(config.as_bytes()).map_err(error)?;
         Ok(Live { session: LiveSession::start(episode, &config).map_err(error)? })
     }
 
@@ -140,7 +140,7 @@ impl Live {
         frame: u32,
         config: &str,
     ) -> Result<Live, JsError> {
-        let config = serde_json::from_str(config).map_err(error)?;
+        let config = serde_json::from_slice(config.as_bytes()).map_err(error)?;
         let session = LiveSession::take_over(trace, episode, frame, &config).map_err(error)?;
         Ok(Live { session })
     }
@@ -179,7 +179,7 @@ impl Live {
     /// # Errors
     /// If it is no action.
     pub fn act(&mut self, action: &str) -> Result<bool, JsError> {
-        let action = serde_json::from_str(action).map_err(error)?;
+        let action = serde_json::from_slice(action.as_bytes()).map_err(error)?;
         Ok(self.session.act(action))
     }
 

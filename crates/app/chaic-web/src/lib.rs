@@ -1,9 +1,10 @@
 //! Replays and play in a browser.
 //!
-//! **What it is**: the module that the pages of chaic load. A [`ReplayPlayer`] re-simulates a trace
-//! in steps, compares the digest of each decision with the recorded one, and shows any verified frame. Partner and helper run again beside it, for drawings of what they know. A [`LiveSession`]
-//! runs an episode in which a person controls an agent, from the start or from a frame of a trace; the
-//! server of a study uses it too. `bindings` exports both to JavaScript.
+//! **What it is**: the module that the pages of chaic load. A [`ReplayPlayer`] re-simulates a trace in
+//! steps, compares the digest of each decision with the recorded one, and shows any verified frame.
+//! Partner and helper run again beside it, for drawings of what they know. A [`LiveSession`] runs an
+//! episode in which a person controls an agent, from the start or from a frame of a trace; the server of
+//! a study uses it too. `bindings` exports both to JavaScript.
 //!
 //! **What it is not**: it reads no files, uses no network and no threads, and contains no page; the
 //! elements of the page are in `web/`.

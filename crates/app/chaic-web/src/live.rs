@@ -115,6 +115,8 @@ pub struct LiveState {
     pub hands: [Option<String>; 2],
     /// Why the person's last action failed, if it did.
     pub failure: Option<String>,
+    /// True if the person's last decision could not be taken.
+    pub is_refused: bool,
     /// Action and plan of the person's agent.
     pub caption: Caption,
     /// Achieved and total value of the goal; absent for a person who helps, until the end.
@@ -152,6 +154,7 @@ pub struct LiveSession {
     is_live: bool,
     /// Chosen action that starts after the pause, if the clock is live.
     next_action: Option<Action>,
+    is_refused: bool,
     /// Executes the person's plans; `None` if the person chooses actions.
     planner: Option<Planner>,
     status: LiveStatus,
@@ -222,6 +225,7 @@ impl LiveSession {
             level: config.level,
             is_live: config.is_live,
             next_action: None,
+            is_refused: false,
             planner,
             status: LiveStatus::Running,
             events: Vec::new(),
@@ -346,7 +350,7 @@ impl LiveSession {
         Ok(self.status)
     }
 
-    /// Takes a decision. Returns false, without any change, if it cannot be taken now.
+    /// Takes a decision. Returns false if it cannot be taken now; then only `LiveState::is_refused` changes.
     pub fn decide(&mut self, input: &LiveInput) -> bool {
         match input {
             LiveInput::Plan(plan) => self.choose_plan(plan),
@@ -376,11 +380,11 @@ impl LiveSession {
         if is_chosen {
             self.status = LiveStatus::Running;
         }
+        self.is_refused = !is_chosen;
         is_chosen
     }
 
-    /// Performs an action. Returns false, without any change, if the person cannot decide now or
-    /// chooses plans.
+    /// Performs an action. Returns false if the person cannot decide now or chooses plans.
     pub fn act(&mut self, action: Action) -> bool {
         let is_due = self.planner.is_none() && self.status == LiveStatus::Waiting;
         if is_due && self.is_live {
@@ -389,6 +393,7 @@ impl LiveSession {
         } else if is_due {
             self.submit(action);
         }
+        self.is_refused = !is_due;
         is_due
     }
 
@@ -460,6 +465,7 @@ impl LiveSession {
             plans: self.plans(),
             hands: self.hands(),
             failure,
+            is_refused: self.is_refused,
             caption: self.caption(),
             progress: knows_progress.then_some([done, total]),
             events,

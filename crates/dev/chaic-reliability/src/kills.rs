@@ -16,6 +16,9 @@ use crate::folder::copy;
 use crate::scenario::{select, words};
 use crate::trial::Trial;
 
+/// Time between two messages about the progress.
+const PROGRESS_INTERVAL: Duration = Duration::from_secs(10);
+
 /// Most kills of one command and its ways back.
 const MAX_KILLS: usize = 3;
 
@@ -47,7 +50,15 @@ pub fn run_all(options: &KillOptions) -> Result<bool> {
         let trial = Trial::new(scenario, &inputs, dir.path())?;
         let duration = duration(&trial, &dir.path().join("timed"))?;
         let (mut n_kills, mut n_commands, mut failures) = (0, 0, 0);
+        let mut last_message = began;
         while n_kills < options.kills {
+            if last_message.elapsed() >= PROGRESS_INTERVAL {
+                last_message = Instant::now();
+                eprintln!(
+                    "{}: {n_kills} of {} kills, {failures} failures",
+                    scenario.name, options.kills
+                );
+            }
             let mut rng = RngStream::new(options.seed, scenario.name, n_commands);
             let at = dir.path().join("killed");
             copy(&inputs, &at)?;

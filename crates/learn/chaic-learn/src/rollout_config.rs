@@ -125,7 +125,8 @@ impl RolloutConfig {
         if self.partners.is_empty() {
             return Err("`rollout.partners` is empty".to_owned());
         }
-        self.perception_factory().map_err(|e| e.to_string())?;
+        let perception = self.perception_factory().map_err(|e| e.to_string())?;
+        perception.check_image_size(self.image_size)?;
         self.read_opponent().map_err(|e| e.to_string())?;
         Ok(())
     }

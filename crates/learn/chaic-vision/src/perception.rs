@@ -55,6 +55,10 @@ impl PerceptionFactory for LearnedPerceptionFactory {
         Grants { ids: requested.ids && self.has_true_names, state: false, ..requested }
     }
 
+    fn image_step(&self) -> u32 {
+        self.detector.image_step()
+    }
+
     fn perception(&self) -> Box<dyn Perception> {
         let inference = self.detector.inference();
         Box::new(LearnedPerception {

@@ -142,10 +142,15 @@ impl TrainedDetector {
         DetectorInference { first_stage, second_stage }
     }
 
-    /// Returns whether both sides of the camera's image are multiples of the network's stride.
+    /// Returns the stride of the network: width and height of images must be multiples of it, pixels.
+    pub fn image_step(&self) -> u32 {
+        self.detector.network.stride() as u32
+    }
+
+    /// Returns whether both sides of the camera's image are multiples of [`Self::image_step`].
     pub fn fits(&self, camera: &Camera) -> bool {
-        let stride = self.detector.network.stride() as u32;
-        camera.width.is_multiple_of(stride) && camera.height.is_multiple_of(stride)
+        let step = self.image_step();
+        camera.width.is_multiple_of(step) && camera.height.is_multiple_of(step)
     }
 
     /// Detects instances in an image, in descending order of score: color (u8, shape [height,

@@ -136,6 +136,10 @@ impl Scene {
         if let ([view], [images]) = (views, &mut images[..]) {
             draw_view(&frame, view, images);
         } else {
+            // The module of the pages has one thread.
+            #[cfg(target_arch = "wasm32")]
+            let pairs = views.iter().zip(images.iter_mut());
+            #[cfg(not(target_arch = "wasm32"))]
             let pairs = views.par_iter().zip(images.par_iter_mut());
             pairs.for_each(|(view, images)| draw_view(&frame, view, images));
         }

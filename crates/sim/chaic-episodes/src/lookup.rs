@@ -31,14 +31,15 @@ pub fn episodes(
 /// `/child` or `/+tires` is a [change](chaic_core::capability::PersonChange) of the partner.
 ///
 /// # Errors
-/// [`SplitError::NoSuchEpisode`] if no episode has this name.
+/// [`SplitError::NoSuchEpisode`] or [`SplitError::Partner`] if no episode has this name.
 pub fn find_episode(id: &str) -> Result<Episode, SplitError> {
     let no_such = || SplitError::NoSuchEpisode { id: id.to_owned() };
     let parts: Vec<&str> = id.split('/').collect();
     let (task, split, number) = match parts[..] {
         [task, split, number] => (task, split, number),
         [task, split, number, change] => {
-            let change = change.parse().map_err(|_| no_such())?;
+            let partner_error = |problem| SplitError::Partner { id: id.to_owned(), problem };
+            let change = change.parse().map_err(partner_error)?;
             return Ok(find_episode(&[task, split, number].join("/"))?.with_partner(change)?);
         }
         _ => return Err(no_such()),

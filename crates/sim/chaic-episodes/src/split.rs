@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::str::FromStr;
 
 use chaic_core::TaskId;
+use chaic_core::capability::UnknownPersonChange;
 use chaic_core::task::Origin;
 
 use crate::Settings;
@@ -52,6 +53,14 @@ pub enum SplitError {
     NoSuchEpisode {
         /// Text that was parsed.
         id: String,
+    },
+    /// The last part of an episode's name is no change of the partner.
+    #[error("episode `{id}`: {problem}")]
+    Partner {
+        /// Text that was parsed.
+        id: String,
+        /// Cause.
+        problem: UnknownPersonChange,
     },
     /// This build generates an episode that differs from the one in the standard split.
     #[error(

@@ -247,8 +247,7 @@ impl SemanticMap {
         self.n_changes
     }
 
-    /// Increases with every change that may affect path costs: a new, forgotten or removed object, an
-    /// object that is missing, or a large object that moves or grows.
+    /// Increases with changes that may affect path costs: new, lost, moved and growing objects.
     pub fn layout_version(&self) -> u32 {
         self.layout_version
     }

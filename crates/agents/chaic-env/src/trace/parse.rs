@@ -109,7 +109,7 @@ fn header(line: &str, path: &Path) -> Result<Header> {
         chaic: String,
     }
     let bad = |problem| EnvError::Unreadable { path: path.to_owned(), line: 1, problem };
-    let v: Version = serde_json::from_str(line)
+    let v: Version = serde_json::from_slice(line.as_bytes())
         .map_err(|e| bad(format!("is not the header of a trace: {e}")))?;
     if v.format != FORMAT {
         let found = v.format.escape_debug();
@@ -122,7 +122,7 @@ fn header(line: &str, path: &Path) -> Result<Header> {
             expected: format!("{FORMAT} versions {MIN_VERSION} to {VERSION}"),
         });
     }
-    let header: Header = serde_json::from_str(line).map_err(|e| bad(e.to_string()))?;
+    let header: Header = serde_json::from_slice(line.as_bytes()).map_err(|e| bad(e.to_string()))?;
     header.rules.check().map_err(bad)?;
     Ok(header)
 }

@@ -147,16 +147,18 @@ impl Record {
     /// # Errors
     /// If the line is not a record.
     pub fn from_line(line: &str) -> Result<Record, serde_json::Error> {
+        // Episodes are read from bytes too, and a second reader would enlarge the module of the pages.
+        let bytes = line.as_bytes();
         if line.starts_with('[') {
-            return serde_json::from_str(line).map(Record::Decision);
+            return serde_json::from_slice(bytes).map(Record::Decision);
         }
         if line.starts_with("{\"end\"") {
-            return serde_json::from_str(line).map(|l: EndLine| Record::End(l.end));
+            return serde_json::from_slice(bytes).map(|l: EndLine| Record::End(l.end));
         }
         if line.starts_with("{\"child\"") {
-            return serde_json::from_str(line).map(|l: ChildLine| Record::Child(l.child));
+            return serde_json::from_slice(bytes).map(|l: ChildLine| Record::Child(l.child));
         }
-        serde_json::from_str(line).map(Record::Event)
+        serde_json::from_slice(bytes).map(Record::Event)
     }
 }
 

@@ -85,7 +85,8 @@ fn a_person_who_decides_nothing_stops_the_world() {
     assert_eq!((state.frame, state.plans.is_empty()), (0, false));
     assert_eq!(session.advance(500).unwrap(), LiveStatus::Waiting);
     assert_eq!(session.state().frame, 0);
-    assert!(!session.choose_plan("fly") && choose_first(&mut session));
+    assert!(!session.choose_plan("fly") && session.state().is_refused);
+    assert!(choose_first(&mut session) && !session.state().is_refused);
     assert!(!session.choose_plan(&state.plans[0]), "it acts already");
     session.advance(40).unwrap();
     assert!(session.state().frame > 0);

@@ -99,6 +99,17 @@ fn another_helper_has_no_memory_from_the_first_different_action_on() {
 }
 
 #[test]
+fn an_agent_that_the_episode_lacks_does_not_run() {
+    let (trace, episode) = played("no_constraint/test/00", "rhp", 60);
+    let (header, records) = trace.split_once('\n').unwrap();
+    let mut header: serde_json::Value = serde_json::from_str(header).unwrap();
+    let helper = header["people"][1].clone();
+    header["people"] = serde_json::Value::Array(vec![helper]);
+    let (_, state) = rerun(&format!("{header}\n{records}"), &episode);
+    assert!(state.agents.is_empty(), "{state:?}");
+}
+
+#[test]
 fn objects_beyond_the_limits_of_the_partner_are_named() {
     let (trace, episode) = played("low_target/test/00", "none", 60);
     let player = verified(&trace, &episode).unwrap();

@@ -16,17 +16,21 @@ use crate::arguments::EvalArguments;
 /// Returns the perception of a run: as given, or as recorded in a run that is resumed.
 ///
 /// # Errors
-/// Those of [`perception_by_name`].
+/// Those of [`perception_by_name`], and if the perception cannot read images of the run's size.
 pub fn perception_of_run(
     arguments: &EvalArguments,
     path: &Path,
 ) -> Result<Arc<dyn PerceptionFactory>> {
     let recorded = RunFolder::read(path).ok().filter(|_| arguments.resume).map(|(_, o)| o);
-    let (perception, behavior) =
-        recorded.map_or((None, None), |options| (options.perception, options.behavior));
+    let (perception, behavior, size) = recorded
+        .map_or((None, None, None), |options| (options.perception, options.behavior, options.size));
     let perception = arguments.perception().or(perception);
     let behavior = arguments.behavior().or(behavior);
-    perception_by_name(perception.as_deref(), behavior.as_deref())
+    let perception = perception_by_name(perception.as_deref(), behavior.as_deref())?;
+    if let Some(size) = arguments.size.or(size) {
+        perception.check_image_size(size).map_err(EvalError::Options)?;
+    }
+    Ok(perception)
 }
 
 /// Returns the object detection and behavior recognition of these names; the default is ground truth.

@@ -98,6 +98,9 @@ fn noisy_perception_is_recorded_and_unknown_ones_are_refused() {
         let error = run_err(dir, &[&EVAL[..], &["--perception", nonsense]].concat());
         assert_eq!(error.lines().count(), 1, "{error}");
     }
+    let size = ["eval", "--episodes", "short", "--helper", "rhp", "--size", "100"];
+    let error = run_err(dir, &[&size[..], &["--perception", "learned", "--out", "size"]].concat());
+    assert!(error.contains("multiple of 32, not 100") && error.lines().count() == 1, "{error}");
 }
 
 /// Configuration of a training with one clip.

@@ -117,6 +117,14 @@ fn an_unfinished_run_is_reported() {
 }
 
 #[test]
+fn the_command_of_a_run_has_all_options() {
+    assert_eq!(options().command(), "chaic eval --helper none,rhp,oracle --n-episodes 2");
+    let change = RunOptions { person: Some("child".parse().unwrap()), traces: false, ..options() };
+    let expected = "chaic eval --helper none,rhp,oracle --n-episodes 2 --person child --no-traces";
+    assert_eq!(change.command(), expected);
+}
+
+#[test]
 fn a_report_of_many_helpers_is_written_without_figures() {
     for (n_helpers, has_figures) in [(MAX_HELPERS, true), (MAX_HELPERS + 1, false)] {
         let of_helper = |k: usize| {

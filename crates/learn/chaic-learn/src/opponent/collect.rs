@@ -104,7 +104,8 @@ impl WindowCollectionConfig {
         if self.tasks.is_empty() {
             return Err("`collect.tasks` is empty".to_owned());
         }
-        self.perception_factory().map(|_| ()).map_err(|e| e.to_string())
+        let perception = self.perception_factory().map_err(|e| e.to_string())?;
+        perception.check_image_size(self.image_size)
     }
 
     fn perception_factory(&self) -> Result<Arc<dyn PerceptionFactory>, PerceptionError> {

@@ -65,6 +65,10 @@ impl PerceptionFactory for LearnedBehaviorFactory {
         self.perception.sensors()
     }
 
+    fn image_step(&self) -> u32 {
+        self.perception.image_step()
+    }
+
     /// Helpers with a granted goal are upper bounds and keep their granted behaviors.
     fn grants(&self, requested: Grants) -> Grants {
         Grants {

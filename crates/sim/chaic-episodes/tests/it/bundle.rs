@@ -145,6 +145,16 @@ fn episodes_are_found_by_name() {
     {
         assert!(matches!(find_episode(id), Err(SplitError::NoSuchEpisode { .. })), "{id}");
     }
+    assert_eq!(
+        find_episode("obstacle/test/07/child").expect("it exists").id(),
+        "obstacle/test/07/child"
+    );
+    let problem =
+        find_episode("obstacle/test/07/giant").expect_err("there is no such person").to_string();
+    assert!(
+        problem.starts_with("episode `obstacle/test/07/giant`: unknown kind of person"),
+        "{problem}"
+    );
 }
 
 #[test]

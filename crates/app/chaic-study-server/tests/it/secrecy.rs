@@ -12,8 +12,18 @@ use crate::kit::{Folder, SIMULATED, Server};
 /// Parts of a state that the person's agent observes: names of objects may be in them.
 const OBSERVED: [&str; 5] = ["plans", "hands", "failure", "caption", "events"];
 /// All parts of a state.
-const PARTS: [&str; 9] =
-    ["frame", "horizon", "status", "plans", "hands", "failure", "caption", "progress", "events"];
+const PARTS: [&str; 10] = [
+    "frame",
+    "horizon",
+    "status",
+    "plans",
+    "hands",
+    "failure",
+    "is_refused",
+    "caption",
+    "progress",
+    "events",
+];
 
 /// Returns the page without its program, with its compressed parts decompressed.
 fn page(server: &Server) -> Vec<u8> {

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use chaic_core::capability::PersonChange;
+use chaic_env::helper_registry::NONE;
 use chaic_env::rules::RuleSetName;
 use chaic_env::{Appearance, Track};
 use chaic_episodes::Split;
@@ -160,6 +161,16 @@ impl EvalArguments {
             HelperArgument::Exec { name, line } => Some(self.exec.command(name, line)),
         };
         self.helpers().filter_map(command).collect()
+    }
+
+    /// Returns whether a helper uses the perception of the run; other processes have their own.
+    pub fn has_perceiving_helpers(&self) -> bool {
+        self.helper.is_none()
+            || self.helpers().any(|argument| match argument {
+                HelperArgument::Names(names) => names.iter().any(|name| name != NONE),
+                HelperArgument::Policy { .. } => true,
+                HelperArgument::Exec { .. } => false,
+            })
     }
 
     /// Returns the policies: names and weight files.

@@ -22,12 +22,12 @@ pub fn perception_of_run(
     path: &Path,
 ) -> Result<Arc<dyn PerceptionFactory>> {
     let recorded = RunFolder::read(path).ok().filter(|_| arguments.resume).map(|(_, o)| o);
-    let (perception, behavior, size) = recorded
-        .map_or((None, None, None), |options| (options.perception, options.behavior, options.size));
+    let (perception, behavior) =
+        recorded.map_or((None, None), |options| (options.perception, options.behavior));
     let perception = arguments.perception().or(perception);
     let behavior = arguments.behavior().or(behavior);
     let perception = perception_by_name(perception.as_deref(), behavior.as_deref())?;
-    if let Some(size) = arguments.size.or(size) {
+    if let Some(size) = arguments.size.filter(|_| arguments.has_perceiving_helpers()) {
         perception.check_image_size(size).map_err(EvalError::Options)?;
     }
     Ok(perception)

@@ -82,6 +82,8 @@ export interface FrameState {
   done: number;
   n_verified: number;
   belief: Belief | null;
+  /** Objects that each agent detects in its image; positions in widths of the view from its left and upper edge. */
+  detected: { label: string; at: [number, number] }[][];
 }
 
 /** Agreement of an agent that runs again with the replay. */

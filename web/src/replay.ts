@@ -168,16 +168,28 @@ export class ChaicReplay extends LitElement {
   }
 
   private pictures(info: ReplayInfo): TemplateResult {
+    const detected = (id: number): FrameState["detected"][number] => this.shown?.detected[id] ?? [];
     const caption = (id: number): TemplateResult | typeof nothing => {
       const found = this.shown?.captions[id];
       if (!found) return nothing;
       const seen = found.last_observed ? html`<br />Recognized: ${found.last_observed}` : nothing;
-      return html`<b>${found.agent}</b>: ${found.action}<br />Plan: ${found.plan || "none"}${seen}`;
+      const labels = detected(id).map((object) => object.label);
+      const list = labels.length > 0 ? html`<br />Detects: ${labels.join(", ")}` : nothing;
+      return html`<b>${found.agent}</b>: ${found.action}<br />Plan: ${found.plan || "none"}${seen}${list}`;
     };
+    const mark = ({ label, at: [x, y] }: { label: string; at: [number, number] }): TemplateResult =>
+      html`<span
+        class="detected ${x > 0.75 ? "before" : ""}"
+        style="left: ${100 * x}%; top: clamp(0.5rem, ${100 * y}%, 100% - 0.5rem)"
+        >${label}</span
+      >`;
     return html`<div class="pictures">
       ${viewers(info).map(
         (agent) => html`<figure class="a${agent.id}">
-          <canvas class="view" width="384" height="384" role="img" aria-label="View of the ${agent.name}"></canvas>
+          <div class="overlaid">
+            <canvas class="view" width="384" height="384" role="img" aria-label="View of the ${agent.name}"></canvas>
+            <div aria-hidden="true">${detected(agent.id).map(mark)}</div>
+          </div>
           <figcaption>${caption(agent.id)}</figcaption>
         </figure>`,
       )}

@@ -97,6 +97,22 @@ export const styles = css`
     top: 0;
     width: 100%;
   }
+  .detected {
+    background: rgb(0 0 0 / 70%);
+    border-left: 3px solid #fff;
+    color: #fff;
+    font-size: 0.6875rem;
+    padding: 0 0.25rem;
+    pointer-events: none;
+    position: absolute;
+    transform: translateY(-50%);
+    white-space: nowrap;
+  }
+  .detected.before {
+    border-left: 0;
+    border-right: 3px solid #fff;
+    transform: translate(-100%, -50%);
+  }
   fieldset.layers {
     border: 1px solid var(--line);
     border-radius: 0.25rem;

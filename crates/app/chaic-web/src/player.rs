@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use chaic_core::agent::PartnerBelief;
+use chaic_core::agent::{BelievedObject, PartnerBelief};
 use chaic_core::geom::to_xz;
 use chaic_core::{AgentId, FRAMES_PER_SECOND, Frame, Vec2};
 use chaic_env::narration::{Caption, action_text};
@@ -124,6 +124,17 @@ pub struct FrameState {
     pub n_verified: usize,
     /// Belief of the helper, if it records one.
     pub belief: Option<PartnerBelief>,
+    /// Objects that each agent detects in its image, if it records them.
+    pub detected: Vec<Vec<DetectedObject>>,
+}
+
+/// Object in an agent's image, as the agent perceives it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DetectedObject {
+    /// Class and name of the track, for example `apple t13`.
+    pub label: String,
+    /// Center, in widths of the view from its left and upper edge.
+    pub at: [f32; 2],
 }
 
 /// State of the agents that run again beside the replay.
@@ -291,7 +302,25 @@ impl ReplayPlayer {
             done: world.progress().0,
             n_verified: self.current.n_decisions(),
             belief: self.belief().cloned(),
+            detected: world.setup().agents().map(|agent| self.detected(agent)).collect(),
         }
+    }
+
+    /// Returns the recorded detections of an agent that are in its view.
+    fn detected(&self, agent: AgentId) -> Vec<DetectedObject> {
+        let Some(thought) = self.current.thoughts().get(agent.index()) else { return Vec::new() };
+        if thought.perceived.is_empty() {
+            return Vec::new();
+        }
+        let view = View::from_agent(self.current.world(), agent, 1, Channels::RGB);
+        let detected = |object: &BelievedObject| {
+            let (center, _) =
+                view.camera.project(object.position_cm.map(|cm| 0.01 * cm as f32).into())?;
+            let at = center.to_array();
+            let label = format!("{} {}", object.class.info().label, object.name);
+            at.iter().all(|x| (0.0..1.0).contains(x)).then_some(DetectedObject { label, at })
+        };
+        thought.perceived.iter().filter_map(detected).collect()
     }
 
     /// Runs partner and helper again, up to their next decision, so that their memories can be shown.

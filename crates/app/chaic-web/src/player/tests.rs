@@ -5,6 +5,7 @@ use chaic_core::AgentError;
 use chaic_env::helper_registry::{BuiltInHelpers, HelperRegistry as _};
 use chaic_env::{Env, EpisodeConfig};
 use chaic_episodes::find_episode;
+use serde_json::{Value, json};
 
 use super::*;
 use chaic_env::narration::ActivityKind;
@@ -134,4 +135,32 @@ fn a_replay_can_be_shown_while_it_is_verified() {
     let json = |player: &ReplayPlayer| serde_json::to_string(&player.info()).unwrap();
     assert_eq!(json(&player), json(&expected));
     assert_eq!(view(&mut player, 250), view(&mut expected, 250));
+}
+
+#[test]
+fn recorded_detections_are_marked_in_the_view() {
+    let (trace, episode) = played("low_target/test/00", "rhp", 60);
+    let player = verified(&trace, &episode).unwrap();
+    let camera =
+        View::from_agent(player.current.world(), AgentId::HELPER, 64, Channels::RGB).camera;
+    let at_m = |depth_m: f32| {
+        let point = camera.eye_in_world - depth_m * camera.rotation().z_axis;
+        point.to_array().map(|m| (100.0 * m).round() as i32)
+    };
+    let perceived = json!([["t7", "apple", at_m(2.0)], ["t8", "bread", at_m(-2.0)]]);
+    let lines = trace.lines().map(|line| {
+        let mut record: Value = serde_json::from_str(line).unwrap();
+        if record[1] == 1 && record[4].is_object() {
+            record[4]["perceived"] = perceived.clone();
+        }
+        record.to_string() + "\n"
+    });
+    let mut player = verified(lines.collect::<String>(), &episode).unwrap();
+    player.seek(1).unwrap();
+    let detected = player.state().detected;
+    assert!(detected[0].is_empty());
+    let [apple] = &detected[1][..] else { panic!("{detected:?}") };
+    assert_eq!(apple.label, "apple t7");
+    // The helper turns a little in this frame.
+    assert!(apple.at.iter().all(|x| (0.3..0.7).contains(x)), "{apple:?}");
 }

@@ -26,14 +26,6 @@ const pages = ["page", "study"];
 const target = process.env.CARGO_TARGET_DIR ?? join(root, "target");
 mkdirSync(out, { recursive: true });
 
-/** Options of wasm-opt: smallest code, with the features that the compiler uses. */
-const optimizations = [
-  "-Oz",
-  ...["bulk-memory", "multivalue", "mutable-globals", "nontrapping-float-to-int", "reference-types", "sign-ext", "simd"].map(
-    (feature) => `--enable-${feature}`,
-  ),
-];
-
 const run = (program, args, env = {}) =>
   execFileSync(program, args, { cwd: root, stdio: "inherit", env: { ...process.env, ...env } });
 
@@ -53,9 +45,7 @@ function buildModule() {
   });
   const wasm = join(target, triple, "web/chaic_web.wasm");
   run("wasm-bindgen", ["--target", "web", "--no-typescript", "--out-dir", join(web, "pkg"), wasm]);
-  const bound = join(web, "pkg/chaic_web_bg.wasm");
-  run(process.execPath, [join(web, "node_modules/binaryen/bin/wasm-opt"), ...optimizations, bound, "-o", bound]);
-  const bytes = readFileSync(bound);
+  const bytes = readFileSync(join(web, "pkg/chaic_web_bg.wasm"));
   writeFileSync(join(out, module), deflateRawSync(bytes, { level: 9 }));
 }
 

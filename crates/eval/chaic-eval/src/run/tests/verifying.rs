@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use chaic_core::AgentId;
-use chaic_env::trace::Header;
+use chaic_env::trace::{Header, Record, Trace};
 
 use super::*;
 
@@ -239,4 +239,25 @@ fn verification_counts_results_and_compares_the_report() {
     assert!(error.contains("is chaic-trace version 99"), "{error}");
     assert!(error.contains("use the chaic that wrote it"), "{error}");
     assert_eq!(error.lines().count(), 1, "{error}");
+}
+
+#[test]
+fn an_episode_that_was_stopped_verifies_wherever_its_trace_stops() {
+    let helpers = TestHelpers::new();
+    let (run, path, _dir) = played_once(&helpers);
+    let (trace, _) = chaic_env::trace::parse(&fs::read(&path).unwrap(), &path).unwrap();
+    let files = episode_files(&[TaskId::LowTarget], 1);
+    let file = fs::read_dir(files.path()).unwrap().next().unwrap().unwrap().path();
+    let episode = Episode::parse(&fs::read(file).unwrap(), "episode").unwrap();
+    let n_events = trace.records.iter().filter(|r| matches!(r, Record::Event(_))).count();
+    assert!(trace.end().is_some() && n_events > 0);
+    for n in 0..trace.records.len() {
+        let stopped = Trace { records: trace.records[..n].to_vec(), ..trace.clone() };
+        assert_eq!(crate::verify::verify(&stopped, &episode, &path).unwrap(), None, "{n} records");
+    }
+    // An episode of a run is not stopped: its result has no trace then.
+    let text = fs::read_to_string(&path).unwrap();
+    let (cut, _) = text.trim_end().rsplit_once('\n').unwrap();
+    fs::write(&path, format!("{cut}\n")).unwrap();
+    assert!(verified(&run, &helpers)[0].contains("differs from the one of the trace"));
 }

@@ -13,8 +13,8 @@ export const skip = probe.stderr.includes("no study server") ? "this build of ch
 const servers = [];
 
 /** Starts `chaic study serve` and returns its process and address. */
-export async function serve(definition, data, listen = "127.0.0.1:0") {
-  const command = ["study", "serve", definition, "--data", data, "--listen", listen, "--format", "json"];
+export async function serve(definition, data, listen = "127.0.0.1:0", options = []) {
+  const command = ["study", "serve", definition, "--data", data, "--listen", listen, "--format", "json", ...options];
   const server = spawn(chaic, command, { stdio: ["ignore", "pipe", "inherit"] });
   servers.push(server);
   let printed = "";

@@ -2,7 +2,8 @@
 // need a command with the feature `study-server`.
 //
 // Promises: a participant plays by keyboard alone; the page holds no episode; a reload in the middle of an episode, a
-// lost connection and a restart of the server lose nothing; the export verifies; stopping deletes all data.
+// lost connection and a restart of the server lose nothing; the export verifies; stopping deletes all data; a helper of
+// the researcher acts beside the participant.
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
@@ -162,4 +163,30 @@ test("stopping in an episode deletes all data on the server", { skip }, async ()
   assert.equal(await page.evaluate(async () => (await indexedDB.databases()).length), 0);
   await context.close();
   assert.equal(await end(server), 0);
+});
+
+test("a helper of the researcher acts beside the participant", { skip }, async () => {
+  const own = join(folder, "own.toml");
+  const partner = STUDY.replace('seat = "helper"\nworld = "goes_on"', 'helper = "mine"').replace(/practice.*\n/, "");
+  writeFileSync(own, partner);
+  const data = join(folder, "own");
+  const program = ["--helper", `mine=exec:"${chaic}" helper serve rhp`, "--exec-grants", "ids,goal_place,behavior"];
+  const { server, url } = await serve(own, data, undefined, program);
+  const { page, context } = await open(url);
+  await page.getByRole("button", { name: /^I agree/ }).click();
+  await page.getByRole("button", { name: /^Continue/ }).click();
+  await page.getByRole("button", { name: /^Start the episode/ }).click();
+  await page.locator("chaic-play section").waitFor();
+  await playByKeys(page, 150);
+  await page.getByRole("button", { name: "Stop here" }).click();
+  await page.locator("#continue").waitFor();
+  await context.close();
+  assert.equal(await end(server), 0);
+  const [file] = dataFiles(data);
+  const traces = readFileSync(join(data, file), "utf8").split("\n").filter((line) => line.includes('"trace"'));
+  const trace = traces.map((line) => JSON.parse(line).text).join("");
+  assert.match(trace, /"helper":"mine"/);
+  const decisions = trace.split("\n").filter((line) => /^\[\d+,1,/.test(line));
+  assert.ok(decisions.length > 3, `${decisions.length} decisions of the helper`);
+  execFileSync(chaic, ["study", "export", data, "--study", own, "--out", join(folder, "own-set")]);
 });

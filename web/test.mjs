@@ -3,15 +3,19 @@
 // Promises: a page verifies its traces and uses no network; a frame looks the same however it is
 // reached; an altered trace is shown up to the frame that differs; everything works by keyboard; a report
 // has the scores of its run and opens its examples; layers of the map show what both agents know; a
-// comparison shows where two runs diverge; there are no findings of axe at any width or color scheme.
+// comparison shows where two runs diverge; a person or another helper goes on from a frame; prompts and
+// answers are shown; there are no findings of axe at any width or color scheme.
 
 import assert from "node:assert/strict";
-import { execFileSync } from "node:child_process";
+import { execFile, execFileSync } from "node:child_process";
 import { createHash } from "node:crypto";
+import { once } from "node:events";
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { createServer } from "node:http";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
+import { promisify } from "node:util";
 import { deflateRawSync, inflateRawSync } from "node:zlib";
 import { chaic, findings, firefox, launch, playTo, scrollWidth } from "./test-kit.mjs";
 
@@ -418,6 +422,64 @@ test("a person takes over from a frame of a replay", async () => {
   await choice.selectOption("0");
   await shown(page);
   assert.equal(await page.evaluate(() => document.querySelector("chaic-replay").frame), 0);
+  await page.close();
+});
+
+test("another helper goes on from a frame of a replay", async () => {
+  const { page } = await open(view);
+  const label = await page.locator("#choice option", { hasText: "infer" }).getAttribute("value");
+  await page.goto(`file://${view}#${label}@300`);
+  await shown(page);
+  await pictures(page, 300);
+  await page.getByLabel("Helper that takes over").selectOption("oracle");
+  await page.getByRole("button", { name: "Go on and compare" }).click();
+  await page.locator("chaic-compare .chart").waitFor();
+  const heading = page.locator("chaic-compare header");
+  assert.match(await heading.innerText(), /infer and oracle from 0:10/);
+  const difference = /First different decision:[^(]*\(frame (\d+)\)/s.exec(await heading.innerText());
+  assert.ok(Number(difference?.[1]) >= 300, String(difference));
+  assert.deepEqual(await findings(page), []);
+  const trace = await verified(page, "continued.jsonl");
+  assert.match(trace, /"helper":"oracle".*"branch_of":\{"trace":"\w+","frame":300\}/);
+  await page.getByRole("button", { name: "Watch the replay" }).click();
+  await shown(page);
+  const text = await page.locator("chaic-replay header").innerText();
+  assert.match(text, /It continues another replay from 0:10 on/);
+  await page.close();
+});
+
+/** Starts a server that answers every question to a language model with the first plan. */
+async function startModel() {
+  const content = JSON.stringify({ reasoning: "<b>The first</b> plan is good.", plan: 1 });
+  const choices = [{ message: { role: "assistant", content }, finish_reason: "stop" }];
+  const completion = JSON.stringify({ choices, usage: { prompt_tokens: 800, completion_tokens: 20 } });
+  const answer = (request, response) => {
+    request.resume().on("end", () => response.setHeader("content-type", "application/json").end(completion));
+  };
+  const server = createServer(answer).listen(0, "127.0.0.1");
+  await once(server, "listening");
+  return server;
+}
+
+test("a replay of a language helper shows its prompts and answers", async () => {
+  const server = await startModel();
+  const [out, file] = [join(folder, "language"), join(folder, "language.html")];
+  const episode = ["--task", "low_target", "--n-episodes", "1", "--size", "128", "--helper", "llm"];
+  const model = ["--endpoint", `http://127.0.0.1:${server.address().port}/v1`, "--model", "first plan"];
+  await promisify(execFile)(chaic, ["eval", "-q", ...episode, ...model, "--out", out]);
+  server.close();
+  execFileSync(chaic, ["view", out, "--out", file]);
+  const { page } = await open(file, "#0@400");
+  await shown(page);
+  const section = page.getByRole("region", { name: "Language model of the helper" });
+  const [, first] = /Decision (\d+) of \d+/.exec(await section.innerText()) ?? [];
+  await section.getByRole("button", { name: "Next decision" }).click();
+  await section.getByText(`Decision ${Number(first) + 1} of`).waitFor();
+  assert.ok((await page.evaluate(() => document.querySelector("chaic-replay").frame)) > 400);
+  assert.match(await section.locator("summary").allInnerTexts().then(String), /^to the model,answer \(800 \+ 20 tokens/);
+  await section.locator("summary").last().click();
+  assert.match(await section.locator("pre").last().innerText(), /<b>The first<\/b> plan/);
+  assert.deepEqual(await findings(page), []);
   await page.close();
 });
 

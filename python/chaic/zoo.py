@@ -121,6 +121,8 @@ class _Pair:
 class _PairBase:
     """Options, spaces and rendering of both environments."""
 
+    metadata: dict[str, Any]
+
     def __init__(
         self,
         task: str | Sequence[str] | None = None,
@@ -137,6 +139,8 @@ class _PairBase:
         render_mode: str | None = None,
     ) -> None:
         super().__init__()
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError(f'unknown render mode {render_mode!r}; the mode is "rgb_array"')
         self._pair = _Pair(
             task, split, observation, image_size, grants, rules, set, appearance, reward
         )

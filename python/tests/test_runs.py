@@ -142,6 +142,7 @@ def test_invalid_arguments_are_refused(tmp_path):
         (ValueError, lambda: chaic.evaluate(out=out, **OPTIONS)),
         (TypeError, lambda: chaic.evaluate({"mine": 3}, out=out, **OPTIONS)),
         (ValueError, lambda: chaic.evaluate({"rhp": Turner}, out=out, **OPTIONS)),
+        (ValueError, lambda: chaic.evaluate({"a/b": Turner}, out=out, **OPTIONS)),
         (ValueError, lambda: chaic.evaluate({"a": Turner, "b": Rhp}, out=out, **OPTIONS)),
         (ValueError, lambda: chaic.evaluate(Turner, out=out, **{**OPTIONS, "tasks": "flying"})),
         (TypeError, lambda: chaic.evaluate(Turner, out=out, colour="red", **OPTIONS)),

@@ -92,3 +92,5 @@ def test_invalid_arguments_are_refused():
         env.step(np.array([99, 0, 0]))
     with pytest.raises(ValueError):
         zoo.env("obstacle", observation="map")
+    with pytest.raises(ValueError, match="rgb_array"):
+        zoo.parallel_env("obstacle", render_mode="human")

@@ -26,6 +26,8 @@ declare module "*/chaic_web.js" {
 
   export function reference_rate(episode: Uint8Array, helper: string, seed: number): number;
 
+  export function continued_trace(trace: Uint8Array, episode: Uint8Array, frame: number, helper: string): string;
+
   export class Player {
     constructor(trace: Uint8Array, episode: Uint8Array);
     verify(frames: number): boolean;

@@ -243,7 +243,8 @@ export class ChaicCompare extends LitElement {
 }
 
 function label(info: ReplayInfo): string {
-  return info.helper === "none" ? "no helper" : info.helper;
+  const name = info.helper === "none" ? "no helper" : info.helper;
+  return info.branch_at === null ? name : `${name} from ${clock(info.branch_at, info.frames_per_second)}`;
 }
 
 function replaced<T>(values: (T | undefined)[], index: number, value: T): (T | undefined)[] {

@@ -10,6 +10,21 @@ export interface Pace {
   speed: number;
 }
 
+/** Returns a line that offers a trace for download, and its replay. */
+export function traceOffer(trace: string, onReplay: () => void): Element {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([trace], { type: "application/jsonl" }));
+  link.download = "trace.jsonl";
+  link.textContent = "Download the trace";
+  const watch = document.createElement("button");
+  watch.type = "button";
+  watch.textContent = "Watch the replay";
+  watch.addEventListener("click", onReplay);
+  const line = document.createElement("p");
+  line.append(link, " (chaic verify trace.jsonl checks it) ", watch);
+  return line;
+}
+
 /** Plays an episode in an element of the page; `onReplay` receives the trace if the person wants to watch it. */
 export async function startGame(
   place: Element,
@@ -21,17 +36,7 @@ export async function startGame(
   Object.assign(element, { workerSource, game: { ...rest, ...pace } });
   element.addEventListener("finished", (event) => {
     const { detail: result } = event as CustomEvent<GameResult>;
-    const link = document.createElement("a");
-    link.href = URL.createObjectURL(new Blob([result.trace], { type: "application/jsonl" }));
-    link.download = "trace.jsonl";
-    link.textContent = "Download the trace";
-    const watch = document.createElement("button");
-    watch.type = "button";
-    watch.textContent = "Watch the replay";
-    watch.addEventListener("click", () => onReplay(result));
-    const line = document.createElement("p");
-    line.append(link, " (chaic verify trace.jsonl checks it) ", watch);
-    place.append(line);
+    place.append(traceOffer(result.trace, () => onReplay(result)));
   });
   place.replaceChildren(element);
 }

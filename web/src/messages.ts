@@ -48,6 +48,10 @@ export interface ReplayInfo {
   helper: string;
   seed: number;
   chaic: string;
+  /** Frame from which it continues another trace. */
+  branch_at: number | null;
+  /** Helpers that can take over. */
+  successors: string[];
   agents: AgentInfo[];
   goal: string[];
   /** True if the re-simulation has ended. */
@@ -73,6 +77,23 @@ export interface Belief {
   goals: [string, number][];
   people: [string, number][];
   evidence?: string[];
+}
+
+/** Part of an exchange with a language model. */
+export interface Passage {
+  heading: string;
+  text: string;
+}
+
+/** Agent whose plans a language model chose. */
+export interface LanguageAgent {
+  agent: string;
+  model: string;
+  decisions: { frame: number; text: string; passages: Passage[] }[];
+  /** Number of decisions whose passages are not in the page. */
+  n_left_out: number;
+  /** Why the record cannot be read. */
+  problem: string | null;
 }
 
 /** State of one frame. */
@@ -240,9 +261,10 @@ export type Request =
   | { type: "play"; module: ArrayBuffer; episode: Uint8Array; config: LiveConfig; branch?: Branch }
   | { type: "advance"; frames: number; viewPx: number; input?: { plan: string } | { action: Action } }
   | { type: "trace" }
-  | { type: "reference"; helper: string };
+  | { type: "reference"; helper: string }
+  | ({ type: "continue"; module: ArrayBuffer; episode: Uint8Array; helper: string } & Branch);
 
-/** Trace and frame from which a person goes on. */
+/** Trace and frame from which a person or another helper goes on. */
 export interface Branch {
   trace: Uint8Array;
   frame: number;

@@ -4,18 +4,20 @@
 import "./compare.js";
 import type { ChaicCompare } from "./compare.js";
 import { embedded, moduleBytes, workerSource } from "./embedded.js";
-import { startGame, type Pace } from "./game.js";
-import type { LiveConfig } from "./messages.js";
+import { startGame, traceOffer, type Pace } from "./game.js";
+import type { LanguageAgent, LiveConfig } from "./messages.js";
 import type { GameResult } from "./play.js";
 import type { Source } from "./player.js";
 import "./replay.js";
 import type { ChaicReplay } from "./replay.js";
 import { makeSortable } from "./sortable.js";
+import { ask } from "./workers.js";
 
 /** Content of an embedded replay. */
 interface Embedded {
   trace: string;
   episode: string;
+  language: LanguageAgent[];
 }
 
 /** What the page shows: a replay, possibly beside another one, at a frame. */
@@ -91,8 +93,8 @@ class Replays {
     this.player.replaceChildren(this.element);
   }
 
-  /** Shows a replay that is not among those of the page. */
-  showOther(element: ChaicReplay): void {
+  /** Shows an element with a replay that is not among those of the page. */
+  showOther(element: ChaicReplay | ChaicCompare): void {
     clearTimeout(this.pending);
     this.shown = undefined;
     this.element = undefined;
@@ -107,8 +109,9 @@ class Replays {
   }
 
   private async source(content: Element): Promise<Source> {
-    const { trace, episode }: Embedded = JSON.parse(new TextDecoder().decode(await embedded(content)));
-    return { module: await moduleBytes(), trace: encoder.encode(trace), episode: encoder.encode(episode) };
+    const { trace, episode, language }: Embedded = JSON.parse(new TextDecoder().decode(await embedded(content)));
+    const module = await moduleBytes();
+    return { module, trace: encoder.encode(trace), episode: encoder.encode(episode), language };
   }
 
   /** Selects a replay in the lists; the second list has the other runs of its episode and seed. */
@@ -136,7 +139,7 @@ class Replays {
 
 let replays: Replays | undefined;
 
-/** Creates the element of a replay, from which a person can take over. */
+/** Creates the element of a replay, from which a person or another helper can take over. */
 function replayElement(source: Source, start: number): ChaicReplay {
   const element = document.createElement("chaic-replay") as ChaicReplay;
   element.addEventListener("take-over", (event) => {
@@ -144,7 +147,39 @@ function replayElement(source: Source, start: number): ChaicReplay {
     const config: LiveConfig = { seed, seat, level: "plans", helper: "none" };
     void play(source.episode, config, { isLive: false, speed: 1 }, { trace: source.trace, frame });
   });
+  element.addEventListener("go-on", (event) => {
+    const { frame, helper } = (event as CustomEvent<{ frame: number; helper: string }>).detail;
+    void goOn(source, frame, helper);
+  });
   return Object.assign(element, { source, workerSource: workerSource(), start });
+}
+
+/** Lets another helper go on from a frame of a replay, and shows both runs beside each other. */
+async function goOn(source: Source, frame: number, helper: string): Promise<void> {
+  const place = document.getElementById("play")!;
+  const status = document.createElement("p");
+  status.setAttribute("role", "status");
+  status.textContent = `The helper ${helper} goes on ...`;
+  place.replaceChildren(status);
+  const { module, trace: from, episode } = source;
+  const response = await ask(workerSource(), { type: "continue", module, trace: from, episode, frame, helper });
+  if (response.type !== "trace") {
+    status.textContent = `The helper ${helper} cannot go on: ${response.type === "error" ? response.message : response.type}`;
+    return;
+  }
+  const { trace } = response;
+  status.textContent = `The helper ${helper} went on.`;
+  const branch = { ...source, trace: encoder.encode(trace), language: [] };
+  place.append(traceOffer(trace, () => showElement(replayElement(branch, frame))));
+  const element = document.createElement("chaic-compare") as ChaicCompare;
+  showElement(Object.assign(element, { sources: [source, branch], workerSource: workerSource(), start: frame }));
+}
+
+/** Shows an element in the place of the selected replay. */
+function showElement(element: ChaicReplay | ChaicCompare): void {
+  if (replays) replays.showOther(element);
+  else document.getElementById("player")!.replaceChildren(element);
+  element.scrollIntoView();
 }
 
 /** Starts a game; its replay replaces the shown one when the person asks for it. */
@@ -157,10 +192,7 @@ async function play(
   const place = document.getElementById("play")!;
   const module = await moduleBytes();
   const watch = ({ trace }: GameResult): void => {
-    const element = replayElement({ module, trace: encoder.encode(trace), episode }, 0);
-    if (replays) replays.showOther(element);
-    else document.getElementById("player")!.replaceChildren(element);
-    element.scrollIntoView();
+    showElement(replayElement({ module, trace: encoder.encode(trace), episode, language: [] }, 0));
   };
   await startGame(place, { module, workerSource: workerSource(), episode, config, pace, branch }, watch);
   place.scrollIntoView();

@@ -18,6 +18,7 @@ import type {
 import { drawnSize, MAX_PX, paint } from "./pictures.js";
 import { Scanner } from "./scanner.js";
 import { styles } from "./styles.js";
+import { startWorker } from "./workers.js";
 
 /** Side of the images in which a person points at objects, pixels. */
 const POINTING_PX = 512;
@@ -117,11 +118,7 @@ export class ChaicPlay extends LitElement {
   }
 
   private startWorker(receive: (response: Response) => void): Simulator {
-    const url = URL.createObjectURL(new Blob([this.workerSource], { type: "text/javascript" }));
-    const worker = new Worker(url);
-    URL.revokeObjectURL(url);
-    worker.onmessage = (event: MessageEvent<Response>) => receive(event.data);
-    worker.onerror = (event) => this.fail(event.message || "the worker has stopped");
+    const worker = startWorker(this.workerSource, receive, (message) => this.fail(message));
     return { post: (request) => worker.postMessage(request), close: () => worker.terminate() };
   }
 

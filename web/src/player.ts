@@ -2,6 +2,7 @@
 
 import type {
   FrameState,
+  LanguageAgent,
   LayerData,
   MapPicture,
   Picture,
@@ -11,6 +12,7 @@ import type {
   Response,
   Wanted,
 } from "./messages.js";
+import { startWorker } from "./workers.js";
 
 /** Drawn frame. */
 export interface DrawnFrame {
@@ -25,6 +27,8 @@ export interface Source {
   module: ArrayBuffer;
   trace: Uint8Array;
   episode: Uint8Array;
+  /** Prompts and answers of agents with a language model. */
+  language: LanguageAgent[];
 }
 
 /** Player in a worker. */
@@ -47,11 +51,7 @@ export class ReplayPlayer {
     private readonly onFrame: (frame: DrawnFrame) => void,
     private readonly onError: (message: string) => void,
   ) {
-    const url = URL.createObjectURL(new Blob([workerSource], { type: "text/javascript" }));
-    this.worker = new Worker(url);
-    this.worker.onmessage = (event: MessageEvent<Response>) => this.receive(event.data);
-    this.worker.onerror = (event) => this.onError(event.message || "the worker has stopped");
-    URL.revokeObjectURL(url);
+    this.worker = startWorker(workerSource, (response) => this.receive(response), onError);
     const { module, trace, episode } = source;
     this.post({ type: "open", module, trace, episode });
   }

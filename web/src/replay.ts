@@ -6,6 +6,7 @@ import { PlaybackClock } from "./clock.js";
 import { controls } from "./controls.js";
 import { clock, lastBefore } from "./frames.js";
 import { badge } from "./badge.js";
+import { language } from "./language.js";
 import { MapLayers } from "./layers.js";
 import type { AgentInfo, Belief, FrameState, ReplayInfo, Wanted } from "./messages.js";
 import { drawnSize, MAX_PX, paint, paintMap } from "./pictures.js";
@@ -34,6 +35,7 @@ export class ChaicReplay extends LitElement {
 
   @queryAll("canvas.view") private viewCanvases!: NodeListOf<HTMLCanvasElement>;
   @query("canvas.map") private mapCanvas?: HTMLCanvasElement;
+  @query("select.successor") private successor?: HTMLSelectElement;
   @query("canvas.layers") private layerCanvas?: HTMLCanvasElement;
 
   private readonly layers = new MapLayers(this, () => this.chooseLayers());
@@ -145,7 +147,8 @@ export class ChaicReplay extends LitElement {
     return html`${controls(this.playback, info.last_frame, info.frames_per_second, this.status(info))}
       ${this.layers.choice(info)} ${this.layers.words(info)}
       ${timeline(info, this.frame, (frame) => this.seek(frame))} ${legend()} ${this.seats(info)}
-      <div class="columns">${this.story(info)} ${this.belief(this.shown?.belief)}</div>`;
+      <div class="columns">${this.story(info)} ${this.belief(this.shown?.belief)}</div>
+      ${language(this.source?.language ?? [], info, this.frame, (frame) => this.seek(frame))}`;
   }
 
   private heading(info: ReplayInfo): TemplateResult {
@@ -155,7 +158,7 @@ export class ChaicReplay extends LitElement {
     return html`<header>
       <h2>${info.task}: the partner (${partner?.person ?? ""}) wants ${info.goal.join(", ")}</h2>
       <p>
-        ${helper}${info.is_complete ? `; ${done} of ${info.total} delivered` : ""}. ${limits(info)}
+        ${helper}${info.is_complete ? `; ${done} of ${info.total} delivered` : ""}. ${limits(info)} ${branch(info)}
         ${info.is_complete ? badge(info) : nothing}
       </p>
       ${this.problem
@@ -203,11 +206,16 @@ export class ChaicReplay extends LitElement {
     </div>`;
   }
 
-  /** Offers to go on from the shown frame as a person. */
+  /** Offers to go on from the shown frame as a person, or with another helper. */
   private seats(info: ReplayInfo): TemplateResult | typeof nothing {
     const takeOver = (seat: number): void => {
       this.playback.seek(this.frame);
       this.dispatchEvent(new CustomEvent("take-over", { detail: { frame: this.frame, seat, seed: info.seed } }));
+    };
+    const goOn = (): void => {
+      this.playback.seek(this.frame);
+      const helper = this.successor?.value ?? "";
+      this.dispatchEvent(new CustomEvent("go-on", { detail: { frame: this.frame, helper } }));
     };
     if (this.problem) return nothing;
     return html`<p>
@@ -215,6 +223,13 @@ export class ChaicReplay extends LitElement {
       ${viewers(info).map(
         ({ id, name }) => html`<button type="button" class="link" @click=${() => takeOver(id)}>${name}</button> `,
       )}
+      ${info.successors.length > 0
+        ? html`or let another helper go on:
+            <select class="successor" aria-label="Helper that takes over">
+              ${info.successors.map((name) => html`<option ?selected=${name === "oracle"}>${name}</option>`)}
+            </select>
+            <button type="button" @click=${goOn}>Go on and compare</button>`
+        : nothing}
     </p>`;
   }
 
@@ -278,6 +293,11 @@ function limits(info: ReplayInfo): string {
   if (!partner) return "";
   const [low, high] = partner.reach_m.map((m) => m.toFixed(2));
   return `The partner reaches from ${low} to ${high} m and lifts ${partner.strength_kg.toFixed(0)} kg.`;
+}
+
+/** Says from where the replay continues another one. */
+function branch({ branch_at, frames_per_second }: ReplayInfo): string {
+  return branch_at === null ? "" : `It continues another replay from ${clock(branch_at, frames_per_second)} on.`;
 }
 
 function legend(): TemplateResult {

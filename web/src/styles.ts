@@ -438,6 +438,12 @@ export const styles = css`
   meter {
     width: 100%;
   }
+  .language pre {
+    max-height: 24rem;
+    overflow-y: auto;
+    overflow-wrap: anywhere;
+    white-space: pre-wrap;
+  }
   .belief td:not(.number) {
     width: 55%;
   }

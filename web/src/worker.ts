@@ -1,6 +1,6 @@
 // Worker that re-simulates, plays and draws, so that the page stays responsive.
 
-import { initSync, Live, Player, reference_rate } from "../pkg/chaic_web.js";
+import { continued_trace, initSync, Live, Player, reference_rate } from "../pkg/chaic_web.js";
 import type {
   LayerData,
   MapLabel,
@@ -63,6 +63,10 @@ function answer(request: Request): void {
       break;
     case "trace":
       send({ type: "trace", trace: live?.trace() ?? "" });
+      break;
+    case "continue":
+      initSync({ module: request.module });
+      send({ type: "trace", trace: continued_trace(request.trace, request.episode, request.frame, request.helper) });
       break;
     case "reference":
       if (!episode) break;

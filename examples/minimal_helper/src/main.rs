@@ -64,7 +64,7 @@ fn evaluate(out: &Path, tasks: &[TaskId], n_episodes: u32) -> Result<Run> {
     let request = RunRequest {
         tasks: Some(tasks.to_vec()),
         helpers: Some(["none", "nearest", "walker"].map(str::to_owned).to_vec()),
-        first: Some(n_episodes),
+        n_episodes: Some(n_episodes),
         ..RunRequest::default()
     };
     let (mut run, _) = Run::open(out, FolderMode::Resume, &request, &Own)?;

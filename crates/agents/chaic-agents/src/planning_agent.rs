@@ -317,20 +317,7 @@ impl<P: Policy> PlanningAgent<P> {
         Some(format!("frame {}: {} {description}{suffix}", last.frame, last.agent))
     }
 
-    /// Updates perception, memory and behavior: the first half of [`Agent::act`].
-    pub fn observe(&mut self, observation: &Observation) {
-        let Some(episode) = &mut self.episode else { return };
-        episode.update(observation, self.perception.as_mut());
-        if let Some(span) = self.policy.memory_frames() {
-            // It remembers the object to which it is going.
-            let kept = episode.plan.and_then(|plan| plan.subject()).map(|subject| subject.track);
-            episode.memory.objects.forget_unseen(span, kept, episode.memory.frame);
-        }
-        self.behavior.observe(observation, &episode.memory);
-        self.policy.observe(observation, &episode.memory, self.behavior.log());
-    }
-
-    /// Decides and acts on the last [observation](PlanningAgent::observe): the second half of
+    /// Decides and acts on the last [observation](Agent::observe): the second half of
     /// [`Agent::act`].
     ///
     /// # Errors
@@ -406,6 +393,19 @@ impl<P: Policy> Agent for PlanningAgent<P> {
     fn act(&mut self, observation: &Observation) -> Result<Action, AgentError> {
         self.observe(observation);
         self.next_action()
+    }
+
+    /// Updates perception, memory and behavior: the first half of [`Agent::act`].
+    fn observe(&mut self, observation: &Observation) {
+        let Some(episode) = &mut self.episode else { return };
+        episode.update(observation, self.perception.as_mut());
+        if let Some(span) = self.policy.memory_frames() {
+            // It remembers the object to which it is going.
+            let kept = episode.plan.and_then(|plan| plan.subject()).map(|subject| subject.track);
+            episode.memory.objects.forget_unseen(span, kept, episode.memory.frame);
+        }
+        self.behavior.observe(observation, &episode.memory);
+        self.policy.observe(observation, &episode.memory, self.behavior.log());
     }
 
     fn perception(&self) -> Option<String> {

@@ -2,8 +2,9 @@
 
 use std::ops::Deref;
 
-use chaic_core::agent::Thought;
-use chaic_core::{Action, AgentId, EntityId, Outcome, ResolvedAction};
+use chaic_core::agent::{BelievedObject, Thought};
+use chaic_core::geom::Camera;
+use chaic_core::{Action, AgentId, ClassId, EntityId, Outcome, ResolvedAction};
 use chaic_world::{EventKind, Setup, World};
 use serde::Serialize;
 
@@ -75,6 +76,31 @@ impl Caption {
         let last_observed = thought.last_observed.clone();
         Caption { agent: name, action, plan: format!("{}{mode}", thought.plan), last_observed }
     }
+}
+
+/// Object in an agent's image, as the agent perceives it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DetectedObject {
+    /// Class.
+    #[serde(skip)]
+    pub class: ClassId,
+    /// Class and name of the track, for example `apple t13`.
+    pub label: String,
+    /// Center, as fractions of the image's sides from its left and upper edge.
+    pub at: [f32; 2],
+}
+
+/// Returns the perceived objects that are in a camera's image.
+pub fn detected_objects(perceived: &[BelievedObject], camera: &Camera) -> Vec<DetectedObject> {
+    let detected = |object: &BelievedObject| {
+        let (center, _) = camera.project(object.position_cm.map(|cm| 0.01 * cm as f32).into())?;
+        let at = [center.x / camera.width as f32, center.y / camera.height as f32];
+        let (class, label) =
+            (object.class, format!("{} {}", object.class.info().label, object.name));
+        let is_inside = at.iter().all(|x| (0.0..1.0).contains(x));
+        is_inside.then_some(DetectedObject { class, label, at })
+    };
+    perceived.iter().filter_map(detected).collect()
 }
 
 /// Returns the label and the id of an object, for example `apple #31`.

@@ -98,6 +98,15 @@ impl<T: Deref<Target = Trace>> Playback<T> {
         next.map_while(|next| decision(&self.trace, *next)).take_while(move |d| d.frame == frame)
     }
 
+    /// Returns the digest of the state at a frame, or at the end if that comes first.
+    ///
+    /// # Errors
+    /// If the trace does not fit the world.
+    pub fn digest_at(mut self, frame: Frame) -> Result<Digest> {
+        while self.world.state().frame < frame && self.step()?.is_some() {}
+        Ok(Digest(self.world.digest()))
+    }
+
     /// Submits the decisions of the current frame, advances the world by one frame and returns its
     /// events; `None` at the end of the trace.
     ///

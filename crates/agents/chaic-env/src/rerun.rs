@@ -7,7 +7,7 @@ use chaic_agents::partners;
 use chaic_core::agent::Thought;
 use chaic_core::memory_view::MemoryView;
 use chaic_core::observation::Images;
-use chaic_core::{Agent, AgentId, Frame};
+use chaic_core::{Agent, AgentId, Frame, Target};
 use chaic_episodes::Episode;
 use chaic_render::Scene;
 use chaic_world::World;
@@ -44,7 +44,8 @@ pub struct RerunMoment {
 }
 
 /// Partner and helper of a trace that run again beside its playback. The world follows the trace; the
-/// agents only observe it, and their actions are compared with the recorded ones.
+/// agents only observe it, and their actions are compared with the recorded ones. A helper that took over
+/// is compared from that frame on.
 pub struct AgentRerun<T> {
     playback: Playback<T>,
     renderer: ObservationRenderer,
@@ -102,6 +103,7 @@ impl<T: Deref<Target = Trace>> AgentRerun<T> {
 
     fn decide(&mut self) -> Vec<RerunMoment> {
         let AgentRerun { playback, renderer, seats, spare_images } = self;
+        let takes_over = playback.header().helper_takes_over();
         let mut moments = Vec::new();
         for recorded in playback.due_decisions() {
             let running = |seat: &&mut Seat| {
@@ -114,6 +116,15 @@ impl<T: Deref<Target = Trace>> AgentRerun<T> {
                 continue;
             };
             let Driver::Agent(agent) = &mut seat.slot.driver else { continue };
+            let observes = seat.agent == AgentId::HELPER
+                && takes_over.is_some_and(|frame| recorded.frame < frame);
+            if observes {
+                agent.observe(&rendered.observation);
+                let action = recorded.action.map(Target::Entity);
+                seat.slot.submitted = Some((action, recorded.action));
+                spare_images.push(rendered.into_images());
+                continue;
+            }
             let chosen = agent.act(&rendered.observation).ok();
             let equal = chosen.filter(|action| rendered.resolve(*action) == recorded.action);
             match (equal, agent.memory_view()) {

@@ -42,6 +42,10 @@ impl Agent for Reseeded {
         self.agent.act(observation)
     }
 
+    fn observe(&mut self, observation: &Observation) {
+        self.agent.observe(observation);
+    }
+
     fn perception(&self) -> Option<String> {
         self.agent.perception()
     }

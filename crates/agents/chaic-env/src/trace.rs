@@ -60,7 +60,8 @@ pub struct Header {
     /// Lighting and colors; absent for the canonical appearance.
     #[serde(default, skip_serializing_if = "is_canonical", with = "as_text")]
     pub appearance: Appearance,
-    /// Trace from which a person took over; absent for an episode that was played from its start.
+    /// Trace from which a person or another helper took over; absent for an episode that was played from
+    /// its start.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub branch_of: Option<BranchPoint>,
 }
@@ -73,6 +74,13 @@ pub struct BranchPoint {
     pub trace: Digest,
     /// First frame in which the decisions may differ.
     pub frame: Frame,
+}
+
+impl BranchPoint {
+    /// Returns the point at this frame of a trace with these bytes.
+    pub fn new(trace: &[u8], frame: Frame) -> BranchPoint {
+        BranchPoint { trace: Digest::of_bytes(trace), frame }
+    }
 }
 
 // `skip_serializing_if` passes a reference.
@@ -104,6 +112,12 @@ impl Header {
     /// Returns the first line of a trace, with the keys of [`VERSION`] and without its line break.
     pub fn to_line(&self) -> String {
         serde_json::to_string(self).expect("a header has string keys")
+    }
+
+    /// Returns the frame from which the helper decides itself, if another trace decides before.
+    pub fn helper_takes_over(&self) -> Option<Frame> {
+        let is_person = self.people.iter().any(|person| person.input.is_some());
+        self.branch_of.filter(|_| !is_person).map(|branch| branch.frame)
     }
 
     /// Returns the key of the episode run.

@@ -1,4 +1,4 @@
-//! Text output of a record, beside the events of the trace.
+//! A record in words: as text beside the events of the trace, or as a list of decisions.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -8,10 +8,13 @@ use chaic_core::{AgentId, Frame};
 use chaic_env::RunKey;
 use chaic_env::trace::{self, Trace};
 use chaic_files::{EntryKind, kind_below};
+use serde::Serialize;
 use serde_json::Value;
 
 use crate::error::{LlmError, Result};
-use crate::exchange::{DecisionRecord, DecisionSource, Exchange, Purpose, Reply, Role};
+use crate::exchange::{
+    DecisionRecord, DecisionSource, Exchange, Fault, Message, Purpose, Reply, Role,
+};
 use crate::record::{self, DecisionLog, RecordEntry};
 
 /// Level of detail.
@@ -78,43 +81,140 @@ fn write_exchange(text: &mut String, exchange: &Exchange, detail: Detail) {
         Purpose::Again => "asked again",
     };
     let _ = writeln!(text, "\n=== frame {}: {purpose}, {}", exchange.frame, exchange.request_hash);
-    let last_message = exchange.request.messages.last();
-    match (detail, exchange.request.purpose) {
-        (Detail::Full, Purpose::Decide | Purpose::Think) => {
-            for message in &exchange.request.messages {
-                let author = match message.role {
-                    Role::User => "to the model",
-                    Role::Assistant => "by the model",
-                };
-                let pictures = match message.images.len() {
-                    0 => String::new(),
-                    n => format!(", with {n} pictures"),
-                };
-                let _ = writeln!(text, "--- {author}{pictures}\n{}", message.text);
-            }
+    for Passage { heading, text: content } in passages(exchange, detail) {
+        let _ = writeln!(text, "--- {heading}");
+        if !content.is_empty() {
+            let _ = writeln!(text, "{content}");
         }
-        // Earlier messages are printed above.
-        (_, Purpose::Choose | Purpose::Again) => {
-            let _ = writeln!(text, "--- to the model\n{}", last_message.map_or("", |m| &m.text));
-        }
-        (Detail::Brief, _) => {}
-    }
-    for fault in &exchange.faults {
-        let _ = writeln!(text, "--- failed: {fault}");
-    }
-    if let Reply::Answer { text: answer, usage, latency_ms, .. } = &exchange.reply {
-        let about = if usage.estimated { "about " } else { "" };
-        let _ = writeln!(
-            text,
-            "--- answer ({about}{} + {} tokens, {:.1} s)\n{answer}",
-            usage.prompt,
-            usage.answer,
-            *latency_ms as f64 / 1000.0
-        );
     }
 }
 
+/// Part of an exchange with a model.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Passage {
+    /// Kind, for example `to the model, with 3 pictures`.
+    pub heading: String,
+    /// Text; empty for a failed request.
+    pub text: String,
+}
+
+/// Decision with the exchanges before it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct ShownDecision {
+    /// Frame.
+    pub frame: Frame,
+    /// Plan, and who chose it.
+    pub text: String,
+    /// Messages of the exchanges, in order.
+    pub passages: Vec<Passage>,
+}
+
+/// Agent of an episode run whose plans a language model chose.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct ShownAgent {
+    /// Name of the agent: `partner` or `helper`.
+    pub agent: String,
+    /// Name of the model.
+    pub model: String,
+    /// Decisions, in order; those after [`MAX_SHOWN_BYTES`] have no passages.
+    pub decisions: Vec<ShownDecision>,
+    /// Number of decisions whose passages are left out.
+    pub n_left_out: usize,
+    /// Why the record cannot be read, if so.
+    pub problem: Option<String>,
+}
+
+/// Maximum length of the passages of a [`ShownAgent`], bytes: several times that of an episode.
+pub const MAX_SHOWN_BYTES: usize = 4 << 20;
+
+impl ShownAgent {
+    fn new(agent: AgentId, model: &str, mut decisions: Vec<ShownDecision>) -> ShownAgent {
+        let (mut n_bytes, mut n_left_out) = (0, 0);
+        for decision in &mut decisions {
+            n_bytes += decision.passages.iter().map(|passage| passage.text.len()).sum::<usize>();
+            if n_bytes > MAX_SHOWN_BYTES {
+                decision.passages.clear();
+                n_left_out += 1;
+            }
+        }
+        let (agent, model) = (agent.to_string(), model.to_owned());
+        ShownAgent { agent, model, decisions, n_left_out, problem: None }
+    }
+}
+
+/// Returns the agents of an episode run that have a record. The problem of a damaged record is part of the
+/// result.
+pub fn agents(run: &Path, key: &RunKey) -> Vec<ShownAgent> {
+    let read = |agent| {
+        let path = record::path(run, key, agent);
+        kind_below(run, &path).ok().filter(|kind| *kind != EntryKind::Missing)?;
+        Some(match DecisionLog::read(run, &path) {
+            Ok(log) => ShownAgent::new(agent, &log.header.model, decisions(&log)),
+            Err(problem) => {
+                let shown = ShownAgent::new(agent, "", Vec::new());
+                ShownAgent { problem: Some(problem.to_string()), ..shown }
+            }
+        })
+    };
+    [AgentId::PARTNER, AgentId::HELPER].into_iter().filter_map(read).collect()
+}
+
+/// Returns the decisions of a record in words.
+fn decisions(record: &DecisionLog) -> Vec<ShownDecision> {
+    let mut decisions = Vec::new();
+    let mut before = Vec::new();
+    for entry in &record.entries {
+        match entry {
+            RecordEntry::Exchange(exchange) => before.extend(passages(exchange, Detail::Full)),
+            RecordEntry::Decision(decided) => decisions.push(ShownDecision {
+                frame: decided.frame,
+                text: decision_text(decided),
+                passages: std::mem::take(&mut before),
+            }),
+        }
+    }
+    decisions
+}
+
+/// Returns the messages of an exchange that are not part of an earlier one.
+fn passages(exchange: &Exchange, detail: Detail) -> Vec<Passage> {
+    let messages = &exchange.request.messages;
+    let is_first = matches!(exchange.request.purpose, Purpose::Decide | Purpose::Think);
+    let shown = match detail {
+        _ if !is_first => &messages[messages.len().saturating_sub(1)..],
+        Detail::Full => messages,
+        Detail::Brief => &[],
+    };
+    let message = |message: &Message| {
+        let author = match message.role {
+            Role::User => "to the model",
+            Role::Assistant => "by the model",
+        };
+        let pictures = match message.images.len() {
+            0 => String::new(),
+            n => format!(", with {n} pictures"),
+        };
+        Passage { heading: format!("{author}{pictures}"), text: message.text.clone() }
+    };
+    let fault =
+        |fault: &Fault| Passage { heading: format!("failed: {fault}"), text: String::new() };
+    let mut passages: Vec<Passage> = shown.iter().map(message).collect();
+    passages.extend(exchange.faults.iter().map(fault));
+    if let Reply::Answer { text, usage, latency_ms, .. } = &exchange.reply {
+        let about = if usage.estimated { "about " } else { "" };
+        let (prompt, answer, s) = (usage.prompt, usage.answer, *latency_ms as f64 / 1000.0);
+        let heading = format!("answer ({about}{prompt} + {answer} tokens, {s:.1} s)");
+        passages.push(Passage { heading, text: text.clone() });
+    }
+    passages
+}
+
 fn write_decision(text: &mut String, decided: &DecisionRecord) {
+    let _ = writeln!(text, ">>> frame {}: {}", decided.frame, decision_text(decided));
+}
+
+/// Describes the plan of a decision and who chose it.
+fn decision_text(decided: &DecisionRecord) -> String {
     let by = match decided.source {
         DecisionSource::Model => "by the model",
         DecisionSource::FallbackInvalid => "by the fallback: no answer was of use",
@@ -124,8 +224,7 @@ fn write_decision(text: &mut String, decided: &DecisionRecord) {
     };
     let number = decided.number.map_or(String::new(), |n| format!("plan {n}, "));
     let lenient = if decided.lenient { ", read leniently" } else { "" };
-    let DecisionRecord { frame, plan, .. } = decided;
-    let _ = writeln!(text, ">>> frame {frame}: {plan} ({number}{by}{lenient})");
+    format!("{} ({number}{by}{lenient})", decided.plan)
 }
 
 /// Appends the events of the trace between two decisions.
@@ -190,5 +289,20 @@ fn write_counts(text: &mut String, record: &DecisionLog) {
     text.push('\n');
     for (name, n) in counts {
         let _ = writeln!(text, "{n:>8} {name}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn passages_after_the_limit_are_left_out() {
+        let passage = || Passage { heading: "answer".to_owned(), text: "x".repeat(3 << 20) };
+        let decision =
+            |frame| ShownDecision { frame, text: String::new(), passages: vec![passage()] };
+        let shown = ShownAgent::new(AgentId::HELPER, "m", vec![decision(1), decision(2)]);
+        let lengths: Vec<usize> = shown.decisions.iter().map(|d| d.passages.len()).collect();
+        assert_eq!((lengths, shown.n_left_out), (vec![1, 0], 1));
     }
 }

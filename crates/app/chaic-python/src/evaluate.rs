@@ -8,7 +8,7 @@ use chaic_agents::PlannerRules;
 use chaic_agents::perception_factory::GROUND_TRUTH;
 use chaic_core::observation::{Grants, SensorConfig};
 use chaic_core::{Action, Agent, AgentError};
-use chaic_env::helper_registry::{BuiltInWithPerception, Helper, HelperRegistry, NONE};
+use chaic_env::helper_registry::{BuiltInWithPerception, Helper, HelperRegistry, check_new_name};
 use chaic_env::{RunKey, Track};
 use chaic_eval::EvalError;
 use chaic_eval::metrics::FormulaSet;
@@ -132,10 +132,10 @@ impl Keywords {
             helpers: Some(helpers),
             split: self.split.map(|split| split.parse().map_err(mistake)).transpose()?,
             episodes: self.episodes,
-            first: self.n_episodes,
+            n_episodes: self.n_episodes,
             seeds: self.seeds,
             rules: self.rules,
-            set: self.set,
+            rule_overrides: self.set,
             no_traces: self.traces == Some(false),
             perception: self.perception.filter(|name| name != GROUND_TRUTH),
             behavior: self.behavior.filter(|name| name != GROUND_TRUTH),
@@ -157,7 +157,7 @@ fn write_report(run: &Run) -> Result<String, EvalError> {
     let progress = run.progress();
     if progress.finished == progress.total {
         write_files(run.folder(), &report)?;
-        chaic_page::write_report(run.folder(), &report)?;
+        chaic_page::write_report(run.folder(), &report, &chaic_page::no_language)?;
     }
     Ok(if progress.finished > 0 { report.text(Format::Table) } else { String::new() })
 }
@@ -207,9 +207,8 @@ pub fn evaluate(
     let built_in = PolicyRegistry::bundled(&with_perception, perception);
     let makers: Vec<_> =
         helpers.into_iter().filter_map(|(name, maker)| Some((name, maker?))).collect();
-    let is_taken = |name: &String| name == NONE || built_in.names().contains(name);
-    if let Some((name, _)) = makers.iter().find(|(name, _)| is_taken(name)) {
-        return Err(mistake(format!("{name:?} is a built-in helper; choose another name")));
+    for (name, _) in &makers {
+        check_new_name(name, &built_in.names(), r#"{"mine": MyHelper}"#).map_err(mistake)?;
     }
     let grants = grants(&granted)?;
     let sensors = sensors(&images, image_size)?;

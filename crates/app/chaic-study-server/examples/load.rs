@@ -13,6 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use chaic_env::helper_registry::BuiltInHelpers;
 use chaic_study::data::CODE_ALPHABET;
 use chaic_study::{Plan, Study};
 use chaic_study_server::{ServerOptions, StudyServer};
@@ -79,7 +80,8 @@ fn main() {
     let start = Instant::now();
     let clock = Box::new(move || start.elapsed().as_secs());
     let report = Box::new(|text: &str| eprintln!("{text}"));
-    let server = StudyServer::open(plan, &options, clock, report).expect("a server");
+    let server =
+        StudyServer::open(plan, &options, &BuiltInHelpers, clock, report).expect("a server");
     let address = server.address();
     let stop = AtomicBool::new(false);
     let memory_before = memory_mib();

@@ -8,6 +8,7 @@ use axum::body::{Body, Bytes, HttpBody as _, to_bytes};
 use axum::http::StatusCode;
 use axum::http::header::{self, HeaderValue};
 use axum::response::{IntoResponse as _, Response};
+use chaic_env::helper_registry::HelperRegistry;
 use serde_json::json;
 use tokio::sync::Semaphore;
 
@@ -51,9 +52,9 @@ pub struct Play {
 
 impl Play {
     /// Creates the state without open episodes.
-    pub fn new(page_digest: String) -> Play {
+    pub fn new(page_digest: String, helpers: &'static dyn HelperRegistry) -> Play {
         let n_threads = available_parallelism().map_or(1, NonZeroUsize::get);
-        Play { sessions: Sessions::default(), page_digest, threads: Semaphore::new(n_threads) }
+        Play { sessions: Sessions::new(helpers), page_digest, threads: Semaphore::new(n_threads) }
     }
 }
 
@@ -98,9 +99,8 @@ pub fn refusal_response(app: &App, refusal: &Refusal) -> Response {
     };
     match refusal {
         Refusal::File(error) => (app.report)(&error.to_string()),
-        Refusal::Changed | Refusal::Simulator(_) | Refusal::Busy => {
-            (app.report)(&refusal.to_string());
-        }
+        Refusal::Simulator(problem) => (app.report)(&format!("{refusal}: {problem}")),
+        Refusal::Changed | Refusal::Busy => (app.report)(&refusal.to_string()),
         _ => {}
     }
     let mut answer = json!({ "error": refusal.to_string() });

@@ -4,6 +4,7 @@ use std::io;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
+use chaic_env::EnvError;
 use chaic_files::{FileError, LockError};
 use chaic_study::StudyError;
 
@@ -32,6 +33,9 @@ pub enum ServerError {
     /// The file of a token is damaged.
     #[error("{} holds no digest of a token; remove it, and the participant cannot go on", .0.display())]
     Token(PathBuf),
+    /// A condition has a helper that the server does not have.
+    #[error(transparent)]
+    Helper(#[from] EnvError),
     /// A name is none of a server.
     #[error(
         "`{0}` is no name of a server; expected a name such as study.example.org, without https://"

@@ -59,8 +59,8 @@ pub enum Refusal {
     /// Too many participants play at once.
     #[error("too many episodes are played at once; repeat it later")]
     Busy,
-    /// The simulator has a problem with the episode.
-    #[error("the episode cannot go on: {0}")]
+    /// The simulator or the helper has a problem, which the researcher sees.
+    #[error("the episode cannot go on")]
     Simulator(#[from] LiveError),
     /// The file of the participant was changed while the server ran.
     #[error("another program has changed the file of the participant")]

@@ -11,6 +11,8 @@ use axum::Router;
 use axum::http::HeaderValue;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
+use chaic_env::helper_registry::{HelperRegistry, find};
+use chaic_env::rules::RuleSet;
 use chaic_page::{study_page, study_page_without_simulator, study_script};
 use chaic_study::{Plan, Simulator, page_content};
 use hyper::server::conn::http1;
@@ -61,11 +63,14 @@ pub struct StudyServer {
 impl StudyServer {
     /// Opens the folder of the data, builds the page and listens. Requests are answered by [`StudyServer::run`].
     ///
+    /// `helpers` creates the helpers beside persons, if the simulator runs on the server.
+    ///
     /// # Errors
     /// [`ServerError`].
     pub fn open(
         plan: Plan,
         options: &ServerOptions,
+        helpers: &'static dyn HelperRegistry,
         clock: Clock,
         report: Reporter,
     ) -> Result<StudyServer> {
@@ -91,7 +96,10 @@ impl StudyServer {
         let is_simulated_here = plan.study().play.simulator == Simulator::Server;
         let page_digest = content["digest"].as_str().unwrap_or_default().to_owned();
         let (page, play) = if is_simulated_here {
-            let play = Arc::new(Play::new(page_digest));
+            for name in plan.helpers() {
+                find(helpers, name, RuleSet::PAPER.planner)?;
+            }
+            let play = Arc::new(Play::new(page_digest, helpers));
             (study_page_without_simulator(title, &content), Some(play))
         } else {
             (study_page(title, &content), None)

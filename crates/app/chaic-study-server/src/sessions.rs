@@ -10,6 +10,7 @@ use std::sync::{Arc, Mutex};
 
 use axum::body::Bytes;
 use chaic_core::{AgentId, Frame, Target};
+use chaic_env::helper_registry::HelperRegistry;
 use chaic_study::{Input, Plan, SEED, Seat, Trial, WorldPace};
 use chaic_web::{InputLevel, LiveConfig, LiveInput, LiveSession, LiveStatus};
 use serde::Deserialize;
@@ -71,8 +72,8 @@ impl Turn {
 }
 
 /// Open episodes by participant.
-#[derive(Default)]
 pub struct Sessions {
+    helpers: &'static dyn HelperRegistry,
     open: Mutex<BTreeMap<String, Arc<OpenSession>>>,
 }
 
@@ -101,6 +102,11 @@ struct Game {
 }
 
 impl Sessions {
+    /// Creates a set without open episodes. The registry creates the helpers beside persons.
+    pub fn new(helpers: &'static dyn HelperRegistry) -> Sessions {
+        Sessions { helpers, open: Mutex::default() }
+    }
+
     /// Opens an episode of a participant, from its stored trace if it has begun, and returns its facts and the
     /// number of the next turn (JSON). An open episode stays as it is.
     ///
@@ -118,7 +124,7 @@ impl Sessions {
         let open = self.entry(code, trial, now_secs)?;
         let mut game = lock(&open.game);
         if game.is_none() {
-            let simulated = Game::new(store.plan(), running.trial, &running.trace);
+            let simulated = Game::new(store.plan(), running.trial, &running.trace, self.helpers);
             *game = Some(simulated.inspect_err(|_| self.close(code))?);
         }
         let Some(game) = &*game else { return Err(Refusal::Closed) };
@@ -212,13 +218,18 @@ impl Sessions {
 
 impl Game {
     /// Starts an episode, or goes on with its stored trace.
-    fn new(plan: &Plan, trial: Trial, trace: &str) -> Result<Game, Refusal> {
+    fn new(
+        plan: &Plan,
+        trial: Trial,
+        trace: &str,
+        helpers: &dyn HelperRegistry,
+    ) -> Result<Game, Refusal> {
         let episode = plan.episodes()[trial.episode].to_json_line();
         let config = live_config(plan, trial);
         let session = if trace.is_empty() {
-            LiveSession::start(episode.as_bytes(), &config)?
+            LiveSession::start(episode.as_bytes(), &config, helpers)?
         } else {
-            LiveSession::resume(trace.as_bytes(), episode.as_bytes(), &config)?
+            LiveSession::resume(trace.as_bytes(), episode.as_bytes(), &config, helpers)?
         };
         let stored = (trace.lines().count(), session.frame());
         Ok(Game { session, next: 0, advanced: None, answer: None, stored, is_due: false })
@@ -300,11 +311,13 @@ fn live_config(plan: &Plan, trial: Trial) -> LiveConfig {
 
 #[cfg(test)]
 mod tests {
+    use chaic_env::helper_registry::BuiltInHelpers;
+
     use super::*;
 
     #[test]
     fn the_number_of_open_episodes_is_bounded_and_idle_ones_make_room() {
-        let sessions = Sessions::default();
+        let sessions = Sessions::new(&BuiltInHelpers);
         for n in 0..MAX_SESSIONS {
             sessions.entry(&n.to_string(), 0, n as u64 / 2).expect("there is memory");
         }

@@ -1,6 +1,9 @@
 //! Exports for JavaScript. Structured values are JSON texts.
 
 use chaic_core::AgentId;
+use chaic_env::continue_with;
+use chaic_env::helper_registry::BuiltInHelpers;
+use chaic_episodes::Episode;
 use wasm_bindgen::prelude::*;
 
 use crate::drawing::{CanvasLabel, DrawnImage, DrawnMap};
@@ -127,7 +130,7 @@ impl Live {
     #[wasm_bindgen(constructor)]
     pub fn new(episode: &[u8], config: &str) -> Result<Live, JsError> {
         let config = serde_json::from_slice(config.as_bytes()).map_err(error)?;
-        Ok(Live { session: LiveSession::start(episode, &config).map_err(error)? })
+        Ok(Live { session: LiveSession::start(episode, &config, &BuiltInHelpers).map_err(error)? })
     }
 
     /// Takes over from a frame of a trace.
@@ -201,6 +204,23 @@ impl Live {
 #[wasm_bindgen]
 pub fn reference_rate(episode: &[u8], helper: &str, seed: u32) -> Result<f64, JsError> {
     reference(episode, helper, seed).map_err(error)
+}
+
+/// Plays an episode as in a trace up to a frame, from which on a built-in helper decides. Returns the new
+/// trace.
+///
+/// # Errors
+/// If an input is unreadable, the helper does not exist, or the trace cannot be continued.
+#[wasm_bindgen]
+pub fn continued_trace(
+    trace: &[u8],
+    episode: &[u8],
+    frame: u32,
+    helper: &str,
+) -> Result<String, JsError> {
+    let episode = Episode::parse(episode, "episode").map_err(error)?;
+    let trace = continue_with(trace, &episode, frame, helper, &BuiltInHelpers).map_err(error)?;
+    Ok(trace.lines().map(|line| line + "\n").collect())
 }
 
 #[wasm_bindgen]

@@ -8,13 +8,10 @@ use chaic_core::observation::{Grants, Held, SensorConfig};
 use chaic_core::{
     Action, Agent as _, AgentError, AgentId, FRAMES_PER_SECOND, Frame, Hand, Outcome, Target,
 };
-use chaic_env::helper_registry::{Helper, NONE, built_in};
+use chaic_env::helper_registry::{BuiltInHelpers, HelperRegistry, find};
 use chaic_env::narration::{Caption, event_text, object_name};
-use chaic_env::rules::RuleSet;
 use chaic_env::trace::{BranchPoint, Header, Record, Trace};
-use chaic_env::{
-    AdvanceOutcome, AgentSlot, Digest, Env, EnvError, EpisodeAgents, EpisodeConfig, Playback,
-};
+use chaic_env::{AdvanceOutcome, AgentSlot, Env, EnvError, EpisodeAgents, EpisodeConfig, Playback};
 use chaic_episodes::{Episode, EpisodeError};
 use chaic_render::{Channels, Scene, View};
 use chaic_world::{EventKind, Setup};
@@ -41,9 +38,9 @@ pub enum LiveError {
     /// An agent cannot decide.
     #[error(transparent)]
     Agent(#[from] AgentError),
-    /// A page can only play helpers without weights and other processes.
-    #[error("the helper `{0}` cannot run in a page")]
-    NoHelper(String),
+    /// The registry has no partner of this name.
+    #[error("the partner `{0}` cannot act here")]
+    NoPartner(String),
     /// A person controls partner or helper.
     #[error("agent {0} has no seat for a person")]
     NoSeat(AgentId),
@@ -71,7 +68,7 @@ pub struct LiveConfig {
     pub seat: AgentId,
     /// Level of the person's decisions.
     pub level: InputLevel,
-    /// Helper if the person is the partner, a built-in one or `none`.
+    /// Helper if the person is the partner; `none` for no helper.
     pub helper: String,
     /// True if the world goes on while the person thinks; otherwise it waits.
     #[serde(default)]
@@ -172,17 +169,25 @@ struct Planner {
 }
 
 impl LiveSession {
-    /// Starts an episode (JSON).
+    /// Starts an episode (JSON) with the helper of a registry.
     ///
     /// # Errors
     /// If the episode is unreadable, or a helper or seat does not exist.
-    pub fn start(episode: &[u8], config: &LiveConfig) -> Result<LiveSession, LiveError> {
+    pub fn start(
+        episode: &[u8],
+        config: &LiveConfig,
+        helpers: &dyn HelperRegistry,
+    ) -> Result<LiveSession, LiveError> {
         let episode = Episode::parse(episode, "episode")?;
-        LiveSession::with(EpisodeConfig::new(&episode, PERSON), config)
+        LiveSession::with(EpisodeConfig::new(&episode, PERSON), config, helpers)
     }
 
-    /// Starts an episode with the rules, image size and appearance of `base`.
-    fn with(base: EpisodeConfig<'_>, config: &LiveConfig) -> Result<LiveSession, LiveError> {
+    /// Starts an episode with the rules, image size, appearance and partner of `base`.
+    fn with(
+        base: EpisodeConfig<'_>,
+        config: &LiveConfig,
+        helpers: &dyn HelperRegistry,
+    ) -> Result<LiveSession, LiveError> {
         let rules = base.rules;
         let (grants, is_helper) = match config.seat {
             AgentId::PARTNER => (partners::partner_grants(rules.planner), false),
@@ -195,13 +200,17 @@ impl LiveSession {
         };
         let person = AgentSlot::external(grants, sensors);
         let agents = if is_helper {
-            EpisodeAgents { helper: Some(person), partner: None }
+            let partner = base.partner.map(|name| {
+                let found = helpers.partner(name, None, rules.planner).map(AgentSlot::from);
+                found.ok_or_else(|| LiveError::NoPartner(name.to_owned()))
+            });
+            EpisodeAgents { helper: Some(person), partner: partner.transpose()? }
         } else {
-            let helper = helper(&config.helper, rules)?.map(AgentSlot::from);
+            let helper = find(helpers, &config.helper, rules.planner)?.map(AgentSlot::from);
             EpisodeAgents { helper, partner: Some(person) }
         };
         let name = if is_helper { PERSON } else { config.helper.as_str() };
-        let partner = (!is_helper).then_some(PERSON);
+        let partner = if is_helper { base.partner } else { Some(PERSON) };
         let env_config = EpisodeConfig { seed: config.seed, helper: name, partner, ..base };
         let env = Env::new(env_config, agents)?;
         let planner = (config.level == InputLevel::Plans).then(|| {
@@ -233,7 +242,8 @@ impl LiveSession {
     }
 
     /// Starts with the decisions of a trace (JSON lines) before a frame; then the person goes on with
-    /// the agent of the seat. The helper of the trace takes part if the person is the partner.
+    /// the agent of the seat. The helper of the trace takes part if the person is the partner, and must be
+    /// built in.
     ///
     /// # Errors
     /// If trace or episode are unreadable, or the other agents do not act as in the trace.
@@ -253,19 +263,20 @@ impl LiveSession {
             rules: header.rules,
             appearance: header.appearance,
             image_size: others.map(|person| person.sensors.image_size).next(),
+            partner: header.partner.as_deref(),
             ..EpisodeConfig::new(&episode, PERSON)
         };
-        let mut session = LiveSession::with(base, &config)?;
+        let mut session = LiveSession::with(base, &config, &BuiltInHelpers)?;
         session.repeat(&trace, |session| session.env.world().state().frame >= from)?;
-        if digest_at(&trace, &episode, from)? != session.env.digest() {
+        if Playback::new(&trace, &episode)?.digest_at(from)? != session.env.digest() {
             return Err(LiveError::Diverged);
         }
-        session.branch_of = Some(BranchPoint { trace: Digest::of_bytes(bytes), frame: from });
+        session.branch_of = Some(BranchPoint::new(bytes, from));
         Ok(session)
     }
 
-    /// Goes on with the trace (JSON lines) of a session with the same episode and configuration. The person of an
-    /// interrupted plan chooses again.
+    /// Goes on with the trace (JSON lines) of a session with the same episode, configuration and helpers. The
+    /// person of an interrupted plan chooses again.
     ///
     /// # Errors
     /// If trace or episode are unreadable, or the session does not repeat the trace.
@@ -273,9 +284,10 @@ impl LiveSession {
         bytes: &[u8],
         episode: &[u8],
         config: &LiveConfig,
+        helpers: &dyn HelperRegistry,
     ) -> Result<LiveSession, LiveError> {
         let (trace, _) = chaic_env::trace::parse(bytes, "trace".as_ref())?;
-        let mut session = LiveSession::start(episode, config)?;
+        let mut session = LiveSession::start(episode, config, helpers)?;
         let n_lines = bytes.iter().filter(|byte| **byte == b'\n').count();
         session.repeat(&trace, |session| session.n_lines() >= n_lines)?;
         session.events.clear();
@@ -559,26 +571,11 @@ fn notices(seat: AgentId, event: &EventKind) -> bool {
 pub fn reference(episode: &[u8], helper_name: &str, seed: u32) -> Result<f64, LiveError> {
     let episode = Episode::parse(episode, "episode")?;
     let config = EpisodeConfig { seed, ..EpisodeConfig::new(&episode, helper_name) };
-    let mut env = Env::new(config, helper(helper_name, config.rules)?)?;
+    let helper = find(&BuiltInHelpers, helper_name, config.rules.planner)?;
+    let mut env = Env::new(config, helper)?;
     env.advance(None)?;
     let (done, total) = env.world().progress();
     Ok(if total > 0.0 { done / total } else { 0.0 })
-}
-
-/// Creates a built-in helper; `None` for `none`.
-fn helper(name: &str, rules: RuleSet) -> Result<Option<Helper>, LiveError> {
-    if name == NONE {
-        return Ok(None);
-    }
-    let found = built_in(name, rules.planner, &GroundTruthPerceptionFactory);
-    found.map(Some).ok_or_else(|| LiveError::NoHelper(name.to_owned()))
-}
-
-/// Returns the digest of a trace's state at a frame.
-fn digest_at(trace: &Trace, episode: &Episode, frame: Frame) -> Result<Digest, LiveError> {
-    let mut playback = Playback::new(trace, episode)?;
-    while playback.world().state().frame < frame && playback.step()?.is_some() {}
-    Ok(Digest(playback.world().digest()))
 }
 
 #[cfg(test)]

@@ -3,11 +3,12 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use chaic_core::agent::{BelievedObject, PartnerBelief};
+use chaic_core::agent::PartnerBelief;
 use chaic_core::geom::to_xz;
 use chaic_core::{AgentId, FRAMES_PER_SECOND, Frame, Vec2};
-use chaic_env::narration::{Caption, action_text};
-use chaic_env::trace::{Decision, Trace, parse};
+use chaic_env::helper_registry::{BuiltInHelpers, HelperRegistry as _, built_in_partner};
+use chaic_env::narration::{Caption, DetectedObject, action_text, detected_objects};
+use chaic_env::trace::{Decision, Header, Trace, parse};
 use chaic_env::{EnvError, Playback};
 use chaic_episodes::{Episode, EpisodeError};
 use chaic_render::floor_plan::{self, FloorPlan};
@@ -52,6 +53,10 @@ pub struct ReplayInfo {
     pub seed: u32,
     /// Version of the program that wrote the trace.
     pub chaic: String,
+    /// Frame from which it continues another trace, if it does.
+    pub branch_at: Option<Frame>,
+    /// Helpers that can take over; empty if an agent of the trace cannot act again in a page.
+    pub successors: Vec<String>,
     /// Agents with their descriptions, by id.
     pub agents: Vec<AgentInfo>,
     /// Wanted objects, for example `3 apple`.
@@ -126,15 +131,6 @@ pub struct FrameState {
     pub belief: Option<PartnerBelief>,
     /// Objects that each agent detects in its image, if it records them.
     pub detected: Vec<Vec<DetectedObject>>,
-}
-
-/// Object in an agent's image, as the agent perceives it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct DetectedObject {
-    /// Class and name of the track, for example `apple t13`.
-    pub label: String,
-    /// Center, in widths of the view from its left and upper edge.
-    pub at: [f32; 2],
 }
 
 /// State of the agents that run again beside the replay.
@@ -260,6 +256,8 @@ impl ReplayPlayer {
             helper: header.helper.clone(),
             seed: header.seed,
             chaic: header.chaic.clone(),
+            branch_at: header.branch_of.map(|branch| branch.frame),
+            successors: successors(header),
             agents: setup.agents().zip(&setup.people).map(agent).collect(),
             goal: goal.collect(),
             is_complete: self.is_complete,
@@ -313,14 +311,7 @@ impl ReplayPlayer {
             return Vec::new();
         }
         let view = View::from_agent(self.current.world(), agent, 1, Channels::RGB);
-        let detected = |object: &BelievedObject| {
-            let (center, _) =
-                view.camera.project(object.position_cm.map(|cm| 0.01 * cm as f32).into())?;
-            let at = center.to_array();
-            let label = format!("{} {}", object.class.info().label, object.name);
-            at.iter().all(|x| (0.0..1.0).contains(x)).then_some(DetectedObject { label, at })
-        };
-        thought.perceived.iter().filter_map(detected).collect()
+        detected_objects(&thought.perceived, &view.camera)
     }
 
     /// Runs partner and helper again, up to their next decision, so that their memories can be shown.
@@ -395,6 +386,16 @@ impl ReplayPlayer {
             image: DrawnImage::from_rgb(map.width(), map.height(), map.as_raw()),
             labels: labels.iter().map(CanvasLabel::new).collect(),
         }
+    }
+}
+
+/// Returns the helpers that can take over in a trace.
+fn successors(header: &Header) -> Vec<String> {
+    let can_act_again = |name: &String| built_in_partner(name, header.rules.planner).is_some();
+    let has_helper = header.people.iter().any(|person| person.agent == AgentId::HELPER);
+    match has_helper && header.partner.as_ref().is_none_or(can_act_again) {
+        true => BuiltInHelpers.names(),
+        false => Vec::new(),
     }
 }
 

@@ -109,7 +109,7 @@ fn run_command(command: Command, format: OutputFormat, launcher: &Launcher) -> R
         Command::Replay(arguments) => commands::replay::run(&arguments, format),
         Command::View(arguments) => commands::view::run(&arguments, format),
         Command::Play(arguments) => commands::play::run(&arguments, format),
-        Command::Study(command) => commands::study::run(&command, format),
+        Command::Study(command) => commands::study::run(&command, format, launcher),
         Command::Render(arguments) => commands::render::run(&arguments, format),
         Command::Scene(command) => commands::scene::run(&command, format),
         Command::Collect(command) => commands::collect::run(&command, format),

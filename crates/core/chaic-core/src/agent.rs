@@ -123,6 +123,10 @@ pub trait Agent: Send {
     /// If the agent fails; it is not called again in this episode.
     fn act(&mut self, observation: &Observation) -> Result<Action, AgentError>;
 
+    /// Updates the memory without a decision, in a turn in which a recording decides for this body. An
+    /// agent that takes over later calls [`Agent::act`] from then on.
+    fn observe(&mut self, _observation: &Observation) {}
+
     /// Returns the name of the perception model, if the agent uses an exchangeable one instead of
     /// granted ids; for the trace.
     fn perception(&self) -> Option<String> {

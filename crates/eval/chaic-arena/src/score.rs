@@ -173,7 +173,7 @@ impl PlayedRun {
     }
 
     fn conditions(&self) -> EvaluationConditions {
-        let RunOptions { tasks, seeds, size, rules, set, partner, person, appearance, .. } =
+        let RunOptions { tasks, seeds, rules, rule_overrides, partner, person, appearance, .. } =
             &self.options;
         let mut tasks = tasks.clone();
         tasks.sort_unstable();
@@ -182,14 +182,14 @@ impl PlayedRun {
             chaic: CHAIC_VERSION.to_owned(),
             track: self.options.track.to_string(),
             rules: rules.to_string(),
-            set: set.clone(),
+            set: rule_overrides.clone(),
             tasks,
             // Ids are TASK/SPLIT/NUMBER.
             split: first.split('/').nth(1).unwrap_or(&self.options.split).to_owned(),
             episodes_sha256: episodes_sha256(&self.episodes),
             n_episodes: self.episodes.len(),
             seeds: *seeds,
-            size: *size,
+            size: self.options.image_size,
             partner: partner.clone().unwrap_or_else(|| RULES.to_owned()),
             person: person.map(|change| change.to_string()),
             appearance: appearance.clone().unwrap_or_else(|| Appearance::Canonical.to_string()),

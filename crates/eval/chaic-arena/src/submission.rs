@@ -182,10 +182,10 @@ impl Submission {
         compare([
             ("tasks", text(&options.tasks), text(&tasks.clone().unwrap_or_else(paper))),
             ("split", options.split.clone(), split.to_string()),
-            ("number of episodes", number(options.first), number(*n_episodes)),
+            ("number of episodes", number(options.n_episodes), number(*n_episodes)),
             ("rule set", options.rules.to_string(), RuleSetName::Paper.to_string()),
         ])?;
-        let has_defaults = options.set.is_empty()
+        let has_defaults = options.rule_overrides.is_empty()
             && options.partner.is_none()
             && options.person.is_none()
             && options.appearance.is_none();

@@ -11,7 +11,7 @@ use chaic_agents::HelperInfo;
 use chaic_core::catalogue::TargetSet;
 use chaic_core::geom::Camera;
 use chaic_core::{AgentId, Frame, TaskId, Vec2};
-use chaic_env::narration::{Caption, event_text};
+use chaic_env::narration::{Caption, DetectedObject, detected_objects, event_text};
 use chaic_env::trace::Trace;
 use chaic_env::{Playback, slug};
 use chaic_episodes::Episode;
@@ -225,10 +225,10 @@ impl<'a> Replay<'a> {
                 panel::tint(rgb, &pixels, label);
             }
         }
-        let believed: Vec<Vec<panel::Mark>> = views
+        let believed: Vec<Vec<DetectedObject>> = views
             .iter()
             .zip(self.playback.thoughts())
-            .map(|(view, thought)| panel::marks(&thought.perceived, &view.camera))
+            .map(|(view, thought)| detected_objects(&thought.perceived, &view.camera))
             .collect();
         let belief = self.belief();
         if let Some([x, z]) = belief.as_ref().and_then(|view| view.belief.position_cm) {

@@ -375,7 +375,7 @@ impl TraceVerifier<'_> {
             seed: header.seed,
             rules: self.rules,
             partner: name,
-            image_size: self.options.size,
+            image_size: self.options.image_size,
             appearance: self.options.appearance()?,
             ..EpisodeConfig::new(&episode, &key.helper)
         };

@@ -21,11 +21,13 @@ pub struct Experiment {
     /// Helpers of both rule sets; `none` is among them.
     pub helpers: Vec<String>,
     /// Number of episodes of each task, from the first; `None` for all.
-    pub first: Option<u32>,
+    #[serde(rename = "first")]
+    pub n_episodes: Option<u32>,
     /// Number of seeds for both rule sets.
     pub seeds: u32,
     /// Side of all agents' images, pixels; `None` for the default of each agent.
-    pub size: Option<u32>,
+    #[serde(rename = "size")]
+    pub image_size: Option<u32>,
     /// Rules that are switched, one at a time.
     pub switches: Vec<String>,
     /// Helpers of the switch runs.
@@ -44,11 +46,11 @@ pub struct ExperimentRequest {
     /// Option `--helper`.
     pub helpers: Option<Vec<String>>,
     /// Option `--n-episodes`.
-    pub first: Option<u32>,
+    pub n_episodes: Option<u32>,
     /// Option `--seeds`.
     pub seeds: Option<u32>,
     /// Option `--size`.
-    pub size: Option<u32>,
+    pub image_size: Option<u32>,
     /// Option `--switch`; empty for no switches.
     pub switches: Option<Vec<String>>,
     /// Option `--switch-helper`.
@@ -85,9 +87,9 @@ impl ExperimentRequest {
         let run = RunRequest {
             tasks: self.tasks.clone(),
             helpers: Some(self.helpers.clone().unwrap_or_else(|| to_strings(&HELPERS))),
-            first: self.first,
+            n_episodes: self.n_episodes,
             seeds: Some(self.seeds.unwrap_or(SEEDS)),
-            size: self.size,
+            image_size: self.image_size,
             episodes: Some(episodes.to_owned()),
             ..RunRequest::default()
         };
@@ -98,9 +100,9 @@ impl ExperimentRequest {
         let plan = Experiment {
             tasks: run.tasks,
             helpers: run.helpers,
-            first: run.first,
+            n_episodes: run.n_episodes,
             seeds: run.seeds,
-            size: run.size,
+            image_size: run.image_size,
             switches: self.switches.clone().unwrap_or_else(differing_rules),
             switch_helpers: self.switch_helpers.clone().unwrap_or(default_helpers),
             switch_seeds: self.switch_seeds.unwrap_or(1),
@@ -114,9 +116,9 @@ impl ExperimentRequest {
         let given_options = [
             ("--task", self.tasks.as_ref().map(|t| list(t)), list(&recorded.tasks)),
             ("--helper", self.helpers.as_ref().map(|h| h.join(",")), recorded.helpers.join(",")),
-            ("--n-episodes", self.first.map(|n| n.to_string()), number(recorded.first)),
+            ("--n-episodes", self.n_episodes.map(|n| n.to_string()), number(recorded.n_episodes)),
             ("--seeds", self.seeds.map(|n| n.to_string()), recorded.seeds.to_string()),
-            ("--size", self.size.map(|n| n.to_string()), number(recorded.size)),
+            ("--size", self.image_size.map(|n| n.to_string()), number(recorded.image_size)),
             (
                 "--switch-helper",
                 self.switch_helpers.as_ref().map(|h| h.join(",")),
@@ -215,8 +217,8 @@ impl Experiment {
             let names: Vec<&str> = self.tasks.iter().map(|t| t.name()).collect();
             text += &format!(" --task {}", names.join(","));
         }
-        text += &number("--n-episodes", self.first);
-        text += &number("--size", self.size);
+        text += &number("--n-episodes", self.n_episodes);
+        text += &number("--size", self.image_size);
         if self.switches.is_empty() {
             return text + " --no-switches";
         }

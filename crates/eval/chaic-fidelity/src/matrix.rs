@@ -105,17 +105,17 @@ impl Matrix {
     /// # Errors
     /// If the folder of episodes is unknown.
     pub fn run_request(&self, part: &ExperimentPart) -> Result<RunRequest> {
-        let Experiment { tasks, first, size, .. } = &self.plan;
+        let Experiment { tasks, n_episodes, image_size, .. } = &self.plan;
         Ok(RunRequest {
             tasks: Some(tasks.clone()),
             helpers: Some(part.helpers.clone()),
             split: None,
-            first: *first,
+            n_episodes: *n_episodes,
             seeds: Some(part.seeds),
-            size: *size,
+            image_size: *image_size,
             episodes: Some(self.episodes()?),
             rules: Some(part.rules),
-            set: part.switch.iter().map(|rule| format!("{rule}=paper")).collect(),
+            rule_overrides: part.switch.iter().map(|rule| format!("{rule}=paper")).collect(),
             no_traces: part.switch.is_some(),
             partner: None,
             person: None,

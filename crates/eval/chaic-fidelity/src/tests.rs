@@ -134,9 +134,9 @@ fn plan() -> Experiment {
     Experiment {
         tasks: vec![LOW],
         helpers: ["none", "rhp", "oracle"].map(str::to_owned).to_vec(),
-        first: None,
+        n_episodes: None,
         seeds: 2,
-        size: None,
+        image_size: None,
         switches: vec!["world.blocking".to_owned()],
         switch_helpers: vec!["none".to_owned()],
         switch_seeds: 1,
@@ -311,7 +311,7 @@ fn invalid_plans_are_refused() {
     assert_eq!(names[2..], folders);
     let given = matrix.run_request(&matrix.plan.parts()[2]).unwrap();
     assert!(given.no_traces && given.rules == Some(RuleSetName::Compat), "{given:?}");
-    assert_eq!(given.set, [format!("{}=paper", in_order[0])]);
+    assert_eq!(given.rule_overrides, [format!("{}=paper", in_order[0])]);
     assert!(matches!(
         Matrix::create(&out, &default_request, &BuiltInHelpers),
         Err(EvalError::NotEmpty { .. })

@@ -22,7 +22,7 @@ use miniz_oxide::deflate::compress_to_vec;
 use serde_json::json;
 
 pub use overview::{Dot, OverviewRow};
-pub use replays::{PageReplay, read_replays};
+pub use replays::{PageReplay, ReadLanguage, no_language, read_replays};
 pub use summary::{ActivityRow, ExampleRow, Gain, RunSummary, ScoreRow, Span};
 
 /// Name of the page that a run writes into its folder.
@@ -46,9 +46,14 @@ const TEMPLATE: (&str, &str) = ("page.html", include_str!("page.html"));
 ///
 /// # Errors
 /// If a trace or an episode cannot be read, or the file cannot be written.
-pub fn write_report(folder: &RunFolder, report: &Report<'_>) -> chaic_eval::Result<()> {
+pub fn write_report(
+    folder: &RunFolder,
+    report: &Report<'_>,
+    language: ReadLanguage<'_>,
+) -> chaic_eval::Result<()> {
     let mut summary = RunSummary::new(folder, report)?;
-    let (replays, _) = read_replays(folder, report.options, &summary.example_traces(folder))?;
+    let traces = summary.example_traces(folder);
+    let (replays, _) = read_replays(folder, report.options, &traces, language)?;
     summary.link(&replays);
     let title = format!("chaic: report of {}", folder.path().display());
     folder.write(REPORT_FILE, page(&title, Some(&summary), &replays).as_bytes())
@@ -136,9 +141,11 @@ impl PageReplay {
         format!("{task} {episode} {seed}")
     }
 
-    /// Returns trace and episode as one encoded text.
+    /// Returns trace, episode, prompts and answers as one encoded text.
     fn content(&self) -> String {
-        encoded(json!({ "trace": self.trace, "episode": self.episode }).to_string().as_bytes())
+        let PageReplay { trace, episode, language, .. } = self;
+        let content = json!({ "trace": trace, "episode": episode, "language": language });
+        encoded(content.to_string().as_bytes())
     }
 }
 

@@ -6,6 +6,7 @@ use chaic_env::RunKey;
 use chaic_env::trace::TraceWarning;
 use chaic_eval::Result;
 use chaic_eval::run::{RunFolder, RunOptions};
+use serde_json::Value;
 
 /// Replay in a page.
 #[derive(Clone, Debug)]
@@ -18,6 +19,16 @@ pub struct PageReplay {
     pub trace: String,
     /// Episode file (JSON).
     pub episode: String,
+    /// Prompts and answers of agents with a language model: a list of `LanguageAgent` (`web/src/messages.ts`).
+    pub language: Value,
+}
+
+/// Reads the [language](PageReplay::language) of an episode run.
+pub type ReadLanguage<'a> = &'a dyn Fn(&RunKey) -> Value;
+
+/// Returns an empty [language](PageReplay::language), for programs without language models.
+pub fn no_language(_: &RunKey) -> Value {
+    Value::Array(Vec::new())
 }
 
 /// Reads the replays of these traces. A damaged trace is read up to its last complete record; warnings
@@ -29,6 +40,7 @@ pub fn read_replays(
     folder: &RunFolder,
     options: &RunOptions,
     traces: &[PathBuf],
+    language: ReadLanguage<'_>,
 ) -> Result<(Vec<PageReplay>, Vec<TraceWarning>)> {
     let mut all_warnings = Vec::new();
     let mut read = |path: &PathBuf| {
@@ -38,7 +50,8 @@ pub fn read_replays(
         let name = format!("{}, {}, seed {}", key.episode, key.helper, key.seed);
         let lines: Vec<String> = trace.lines().collect();
         let episode = folder.episode(options, &key)?.to_json_line();
-        Ok(PageReplay { key, name, trace: lines.join("\n") + "\n", episode })
+        let language = language(&key);
+        Ok(PageReplay { key, name, trace: lines.join("\n") + "\n", episode, language })
     };
     let replays: Result<Vec<PageReplay>> = traces.iter().map(&mut read).collect();
     Ok((replays?, all_warnings))

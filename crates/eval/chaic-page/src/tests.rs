@@ -10,7 +10,8 @@ const EVIL: &str = "</script><b onload=\"x\">&";
 fn replay(text: &str) -> PageReplay {
     let (task, text) = (TaskId::LowTarget, text.to_owned());
     let key = RunKey { task, helper: text.clone(), episode: text.clone(), seed: 0 };
-    PageReplay { key, name: text.clone(), trace: text.clone(), episode: text }
+    let language = serde_json::json!([text]);
+    PageReplay { key, name: text.clone(), trace: text.clone(), episode: text, language }
 }
 
 fn summary(text: &str) -> RunSummary {

@@ -1,5 +1,7 @@
 //! The plan of a study: its conditions, episodes and digest, and the trials of each slot.
 
+use std::collections::BTreeSet;
+
 use chaic_core::FRAMES_PER_SECOND;
 use chaic_env::RunKey;
 use chaic_episodes::{Episode, find_episode};
@@ -117,6 +119,12 @@ impl Plan {
     /// Returns the conditions.
     pub fn conditions(&self) -> &[Condition] {
         &self.conditions
+    }
+
+    /// Returns the names of the helpers beside persons who play the partner, each once.
+    pub fn helpers(&self) -> BTreeSet<&str> {
+        let beside = self.conditions.iter().filter(|condition| condition.seat == Seat::Partner);
+        beside.map(|condition| condition.helper.as_str()).collect()
     }
 
     /// Returns all episodes of practice and conditions.

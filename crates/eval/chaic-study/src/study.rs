@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use chaic_core::TaskId;
 use chaic_core::capability::PersonKind;
+use chaic_env::helper_registry::check_new_name;
 use chaic_files::read_user_file;
 use serde::{Deserialize, Serialize};
 
@@ -115,7 +116,7 @@ pub struct PlaySettings {
     /// Agent that the person controls.
     #[serde(default = "partner")]
     pub seat: Seat,
-    /// Helper beside a person who plays the partner.
+    /// Helper beside a person who plays the partner; on a server, also one that is given to it.
     #[serde(default = "no_helper")]
     pub helper: String,
     /// Level of the decisions.
@@ -353,14 +354,19 @@ impl Study {
     }
 
     fn play_problem(&self) -> Option<String> {
-        let PlaySettings { helper, speed, seat, .. } = &self.play;
-        if let Some(unknown) =
-            self.factors.helper.iter().chain([helper]).find(|name| !is_helper(name))
-        {
-            return Some(format!(
-                "`helper` names `{unknown}`; expected one of {}",
-                helper_names().join(", ")
-            ));
+        let PlaySettings { helper, speed, seat, simulator, .. } = &self.play;
+        let mut helpers = self.factors.helper.iter().chain([helper]);
+        if let Some(unknown) = helpers.find(|name| !is_helper(name, *simulator)) {
+            let names = helper_names().join(", ");
+            return Some(match simulator {
+                Simulator::Page => format!(
+                    "`helper` names `{unknown}`; expected one of {names}; others need \
+                     `play.simulator = \"server\"`"
+                ),
+                Simulator::Server => {
+                    format!("`helper` names `{unknown}`; expected one of {names}, or another name")
+                }
+            });
         }
         let seats = self.factors.seat.iter().chain([seat]);
         if !self.factors.helper.is_empty() && seats.clone().any(|seat| *seat == Seat::Helper) {
@@ -391,8 +397,10 @@ pub(crate) fn helper_names() -> Vec<&'static str> {
     std::iter::once(chaic_env::helper_registry::NONE).chain(built_in).collect()
 }
 
-fn is_helper(name: &str) -> bool {
+/// Returns whether a helper of this name can exist. A server can have other ones than a page.
+fn is_helper(name: &str, simulator: Simulator) -> bool {
     helper_names().contains(&name)
+        || (simulator == Simulator::Server && check_new_name(name, &[], "").is_ok())
 }
 
 /// Returns a problem if an entry is repeated.

@@ -67,6 +67,11 @@ fn errors_name_the_key_and_the_expectation() {
         ("no_constraint/train/00", "high_target/test/00", "must not repeat `high_target/test/00`"),
         ("high_target/test/02", "high_target/test/99", "high_target/test/99"),
         ("\"infer\"]", "\"deep\"]", "`helper` names `deep`; expected one of none, random"),
+        (
+            "\"infer\"]\n",
+            "\"my own\"]\n[play]\nsimulator = \"server\"\n",
+            "`helper` names `my own`; expected one of none",
+        ),
         ("\"rhp\", \"infer\"]", "\"none\"]", "`factors.helper` must have from 2 to 16 different"),
         ("\"none\", \"rhp\", \"infer\"]", "\"rhp\"]", "`factors.helper` must have from 2"),
         ("[forms]", "seat = [\"partner\", \"helper\"]\n[forms]", "`factors.helper` needs"),

@@ -46,9 +46,14 @@ impl PlanHistory {
         self.last_frame = frame;
     }
 
-    /// Returns whether a new choice is due although `current` is not finished. `has_changed` is
+    /// Returns whether a new choice is due although `current` is not finished, and notes it. `has_changed` is
     /// true if the map has changed in a relevant way since the last choice.
-    pub fn is_due(&mut self, context: &Context<'_>, current: &Plan, has_changed: bool) -> bool {
+    pub fn begin_reconsideration(
+        &mut self,
+        context: &Context<'_>,
+        current: &Plan,
+        has_changed: bool,
+    ) -> bool {
         let since = context.memory.frame.saturating_sub(self.last_frame);
         let is_urgent = since >= URGENT_FRAMES && context.memory.child_is_away(context.briefing);
         let is_due = match current {

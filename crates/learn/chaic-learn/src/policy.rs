@@ -152,7 +152,7 @@ impl Policy for LearnedPolicy {
     }
 
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, is_news: bool) -> bool {
-        self.features.history.is_due(context, current, is_news)
+        self.features.history.begin_reconsideration(context, current, is_news)
     }
 
     fn supersedes(&self, new: &Plan, current: &Plan) -> bool {

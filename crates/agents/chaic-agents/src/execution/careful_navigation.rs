@@ -75,7 +75,8 @@ impl Navigator for CarefulNavigator {
             return NavigationStep::Arrived;
         }
         self.age += 1;
-        if !self.is_path_valid(costs, here, destination) && !self.plan(memory, here, destination) {
+        if !self.advance_on_path(costs, here, destination) && !self.plan(memory, here, destination)
+        {
             return NavigationStep::Unreachable;
         }
         // The center of the agent's own cell is an arrival position: no step brings it closer.
@@ -111,9 +112,8 @@ impl Navigator for CarefulNavigator {
 }
 
 impl CarefulNavigator {
-    /// Returns whether the path still leads to the destination without new obstacles. Advances on
-    /// it.
-    fn is_path_valid(&mut self, costs: &CostMap, here: Vec2, destination: &Destination) -> bool {
+    /// Advances on the path. Returns false if it leads elsewhere or is blocked.
+    fn advance_on_path(&mut self, costs: &CostMap, here: Vec2, destination: &Destination) -> bool {
         let (center, _) = destination.center_and_radius();
         let same = self
             .planned_for

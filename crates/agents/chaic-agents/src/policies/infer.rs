@@ -159,8 +159,8 @@ impl InferPolicy {
         goals
     }
 
-    /// Returns whether the goal is clear enough to act on it.
-    fn is_goal_clear(&mut self, context: &Context<'_>) -> bool {
+    /// Returns whether the goal is clear enough to act on it, and notes when it became so.
+    fn check_goal(&mut self, context: &Context<'_>) -> bool {
         let is_clear = context.briefing.goal.is_some()
             || self.belief.as_ref().is_some_and(|belief| belief.goal.most_likely().1 >= SURE);
         if is_clear && self.identified.is_none() {
@@ -347,7 +347,7 @@ impl Policy for InferPolicy {
         if let Some(plan) = self.rules.child_plan(context) {
             return Ok(plan);
         }
-        if !self.is_goal_clear(context) {
+        if !self.check_goal(context) {
             self.mode = "watch";
             return Ok(self.while_unclear(context, valid));
         }
@@ -375,7 +375,7 @@ impl Policy for InferPolicy {
             Plan::Explore | Plan::FollowPartner | Plan::Wait => {
                 has_changed || since >= IDLE_FRAMES || {
                     let was_clear = self.identified.is_some();
-                    !was_clear && self.is_goal_clear(context)
+                    !was_clear && self.check_goal(context)
                 }
             }
             Plan::PickUp(_) | Plan::PickContainer(_) => has_changed && since >= WALK_FRAMES,

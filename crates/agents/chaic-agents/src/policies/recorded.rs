@@ -21,9 +21,6 @@ const STEP_TIME_FACTOR: Frame = 2;
 const MIN_SEARCH_FRAMES: Frame = 150;
 /// Attempts beyond the recorded ones, for a step in which the person succeeded: outcomes are random.
 const EXTRA_ATTEMPTS: u32 = 2;
-/// Interval at which a search reconsiders its plan, frames: that of the rules
-/// (`planner.time.reconsider_frames`).
-const RECONSIDER_FRAMES: Frame = 40;
 
 /// Interaction of a recorded person.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -350,7 +347,10 @@ impl Policy for RecordedPolicy {
         match current {
             Plan::TurnAround | Plan::PutIn => false,
             _ if pending.is_over(context) => true,
-            Plan::Explore => has_changed || now >= self.last_choice + RECONSIDER_FRAMES,
+            Plan::Explore => {
+                let interval = context.memory.rules.time.reconsider_frames;
+                has_changed || now >= self.last_choice + interval
+            }
             _ => false,
         }
     }

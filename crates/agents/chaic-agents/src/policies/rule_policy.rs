@@ -195,7 +195,7 @@ impl Policy for RulePolicy {
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, has_changed: bool) -> bool {
         let rules = context.memory.rules;
         if !rules.reconsiders {
-            return self.is_interrupted(context, current);
+            return self.check_interruption(context, current);
         }
         if matches!(current, Plan::Deliver | Plan::PutIn | Plan::LiftWith(_) | Plan::TurnAround) {
             // These are interrupted only for the child.
@@ -215,9 +215,9 @@ impl Policy for RulePolicy {
 }
 
 impl RulePolicy {
-    /// Returns whether the rules for the child interrupt the plan. In the original, nothing else
+    /// Returns whether the rules for the child interrupt the plan, and notes a finished look around. In the original, nothing else
     /// does (facts A2.4).
-    fn is_interrupted(&mut self, context: &Context<'_>, current: &Plan) -> bool {
+    fn check_interruption(&mut self, context: &Context<'_>, current: &Plan) -> bool {
         match current {
             // The time since looking around starts at its end.
             Plan::TurnAround => self.last_look_around = context.memory.frame,

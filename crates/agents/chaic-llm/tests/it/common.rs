@@ -44,7 +44,7 @@ impl Fixture {
     pub fn request(&self, helpers: &[&str]) -> RunRequest {
         RunRequest {
             helpers: Some(helpers.iter().map(|h| (*h).to_owned()).collect()),
-            size: Some(SIZE),
+            image_size: Some(SIZE),
             episodes: Some(self.path("episodes")),
             ..RunRequest::default()
         }

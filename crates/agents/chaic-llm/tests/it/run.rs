@@ -65,7 +65,7 @@ fn a_replay_of_another_run_stops_with_a_reason() {
     let live = LanguageHelpers::live(settings, flag()).unwrap();
     fixture.play("live", &fixture.request(&["llm"]), &live);
     let mut other = fixture.request(&["llm"]);
-    other.size = Some(96);
+    other.image_size = Some(96);
     let replay = LanguageHelpers::replay(&fixture.path("live"), flag()).unwrap();
     let (is_complete, results) = fixture.play("other", &other, &replay);
     assert!(!is_complete && results.is_empty());

@@ -8,6 +8,10 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 
+use chaic_agents::PlannerRules;
+use chaic_core::observation::{Grants, SensorConfig};
+use chaic_core::{Action, Agent, AgentError, Briefing, Observation};
+use chaic_env::helper_registry::{BuiltInHelpers, Helper, HelperRegistry};
 use chaic_study::data::CODE_ALPHABET;
 use chaic_study::{Plan, Study};
 use chaic_study_server::{Counts, ServerError, ServerOptions, StudyServer};
@@ -45,6 +49,37 @@ episodes = ["high_target/test/00"]
 simulator = "server"
 seat = "helper"
 "#;
+
+/// Built-in helpers, the helper `mine`, and the helper `broken`, which fails.
+pub struct TestHelpers;
+
+impl HelperRegistry for TestHelpers {
+    fn names(&self) -> Vec<String> {
+        [BuiltInHelpers.names(), vec!["mine".to_owned(), "broken".to_owned()]].concat()
+    }
+
+    fn make(&self, name: &str, rules: PlannerRules) -> Option<Helper> {
+        match name {
+            "mine" => BuiltInHelpers.make("rhp", rules),
+            "broken" => Some(Helper { agent: Box::new(BrokenAgent), grants: Grants::NONE }),
+            _ => BuiltInHelpers.make(name, rules),
+        }
+    }
+}
+
+struct BrokenAgent;
+
+impl Agent for BrokenAgent {
+    fn sensors(&self) -> SensorConfig {
+        SensorConfig::NONE
+    }
+
+    fn reset(&mut self, _: &Briefing) {}
+
+    fn act(&mut self, _: &Observation) -> Result<Action, AgentError> {
+        Err(AgentError::Broken("no idea".to_owned()))
+    }
+}
 
 /// A folder with a study, and the data in it.
 pub struct Folder {
@@ -102,6 +137,7 @@ impl Folder {
         let server = StudyServer::open(
             self.plan(),
             &options,
+            &TestHelpers,
             Box::new(move || clock.load(Ordering::SeqCst)),
             Box::new(move |text| report.lock().expect("no panic").push(text.to_owned())),
         )?;

@@ -11,7 +11,7 @@ use chaic_study_server::{
 use chaic_web::{InputLevel, LiveConfig, LiveInput, LiveSession, LiveStatus};
 use serde_json::{Value, json};
 
-use crate::kit::{Answer, Client, DEFINITION, Folder, SIMULATED, code};
+use crate::kit::{Answer, Client, DEFINITION, Folder, SIMULATED, TestHelpers, code};
 
 /// Side of the pictures of tests, pixels.
 const SIDE_PX: u32 = 64;
@@ -25,7 +25,7 @@ fn local(plan: &Plan, level: InputLevel) -> LiveSession {
     let helper = if is_helper { "none" } else { plan.helper(trial) };
     let config = LiveConfig { seed: 0, seat, level, helper: helper.to_owned(), is_live };
     let episode = plan.episodes()[trial.episode].to_json_line();
-    LiveSession::start(episode.as_bytes(), &config).expect("an episode")
+    LiveSession::start(episode.as_bytes(), &config, &TestHelpers).expect("an episode")
 }
 
 /// Returns a decision for a state: the first plan, or an action that depends on the turn.
@@ -89,8 +89,10 @@ fn exported(folder: &Folder) -> (usize, usize) {
 fn an_episode_equals_the_one_in_a_page() {
     let live = SIMULATED.replace("seat = \"helper\"", "world = \"goes_on\"\nhelper = \"rhp\"");
     let steps = SIMULATED.replace("seat = \"helper\"", "input = \"steps\"\nhelper = \"none\"");
+    let own = SIMULATED.replace("seat = \"helper\"", "helper = \"mine\"");
     for (definition, level, frames) in [
         (SIMULATED, InputLevel::Plans, MAX_TURN_FRAMES),
+        (&own, InputLevel::Plans, 40),
         (&live, InputLevel::Plans, 12),
         (&steps, InputLevel::Steps, 7),
     ] {
@@ -233,8 +235,12 @@ fn a_stored_trace_of_another_simulator_is_refused_and_reported() {
     let client = Client { address: server.address, ..client };
     let refused = client.open(0);
     assert_eq!(refused.status, 422, "{refused:?}");
-    assert!(refused.error().starts_with("the episode cannot go on: "), "{}", refused.error());
-    assert_eq!(server.problems(), [refused.error()]);
+    assert_eq!(refused.error(), "the episode cannot go on");
+    let problems = server.problems();
+    assert!(
+        problems[0].contains("do not act as in the trace") && problems.len() == 1,
+        "{problems:?}"
+    );
     // The page goes on with the next episode.
     let left = "{\"type\":\"trial_end\",\"trial\":0,\"outcome\":\"left\"}\n".to_owned();
     assert_eq!(client.append(2, &[left]).stored(), 3);
@@ -344,4 +350,26 @@ fn a_page_with_the_simulator_has_no_episodes_on_the_server() {
     {
         assert_eq!((answer.status, answer.error().as_str()), (404, "there is no such page"));
     }
+}
+
+#[test]
+fn a_helper_that_fails_ends_the_episode_and_the_researcher_learns_why() {
+    let broken = SIMULATED.replace("seat = \"helper\"", "helper = \"broken\"");
+    let folder = Folder::new(&broken);
+    let server = folder.server();
+    let client = server.client(1);
+    client.begin();
+    client.open(0);
+    let answer = client.turn(0, 0, &json!({ "frames": 9, "view_px": SIDE_PX }));
+    assert_eq!(answer.status, 422);
+    assert_eq!(answer.json()["error"], "the episode cannot go on");
+    let problems = server.problems();
+    assert!(problems.iter().any(|problem| problem.contains("no idea")), "{problems:?}");
+}
+
+#[test]
+fn a_server_without_a_helper_of_the_study_does_not_start() {
+    let unknown = SIMULATED.replace("seat = \"helper\"", "helper = \"theirs\"");
+    let error = Folder::new(&unknown).try_server().err().expect("an error").to_string();
+    assert!(error.contains("unknown helper `theirs`"), "{error}");
 }

@@ -3,6 +3,8 @@
 
 use chaic_episodes::find_episode;
 
+use chaic_env::helper_registry::built_in_partner;
+
 use super::*;
 use crate::player::tests::verified;
 
@@ -41,7 +43,7 @@ fn an_episode_of_plans_verifies_in_each_seat() {
         [(AgentId::HELPER, "none"), (AgentId::PARTNER, "rhp"), (AgentId::PARTNER, "none")]
     {
         let config = config(seat, InputLevel::Plans, helper);
-        let mut session = LiveSession::start(&episode, &config).unwrap();
+        let mut session = LiveSession::start(&episode, &config, &BuiltInHelpers).unwrap();
         let info = session.info();
         assert_eq!(
             info.goal.is_empty(),
@@ -66,7 +68,7 @@ fn an_episode_of_plans_verifies_in_each_seat() {
 fn an_episode_that_is_stopped_verifies_up_to_its_last_decision() {
     let episode = episode();
     let config = config(AgentId::HELPER, InputLevel::Plans, "none");
-    let mut session = LiveSession::start(&episode, &config).unwrap();
+    let mut session = LiveSession::start(&episode, &config, &BuiltInHelpers).unwrap();
     for _ in 0..40 {
         if session.advance(7).unwrap() == LiveStatus::Waiting {
             choose_first(&mut session);
@@ -79,7 +81,7 @@ fn an_episode_that_is_stopped_verifies_up_to_its_last_decision() {
 #[test]
 fn a_person_who_decides_nothing_stops_the_world() {
     let config = config(AgentId::HELPER, InputLevel::Plans, "none");
-    let mut session = LiveSession::start(&episode(), &config).unwrap();
+    let mut session = LiveSession::start(&episode(), &config, &BuiltInHelpers).unwrap();
     assert_eq!(session.advance(500).unwrap(), LiveStatus::Waiting);
     let state = session.state();
     assert_eq!((state.frame, state.plans.is_empty()), (0, false));
@@ -96,8 +98,12 @@ fn a_person_who_decides_nothing_stops_the_world() {
 fn a_live_world_goes_on_while_the_person_chooses() {
     let episode = episode();
     let helper = config(AgentId::HELPER, InputLevel::Plans, "none");
-    let mut session =
-        LiveSession::start(&episode, &LiveConfig { is_live: true, ..helper.clone() }).unwrap();
+    let mut session = LiveSession::start(
+        &episode,
+        &LiveConfig { is_live: true, ..helper.clone() },
+        &BuiltInHelpers,
+    )
+    .unwrap();
     assert_eq!(session.advance(60).unwrap(), LiveStatus::Waiting);
     let state = session.state();
     assert_eq!((state.frame, state.plans.is_empty()), (60, false));
@@ -110,6 +116,7 @@ fn a_live_world_goes_on_while_the_person_chooses() {
     let mut steps = LiveSession::start(
         &episode,
         &LiveConfig { is_live: true, level: InputLevel::Steps, ..helper },
+        &BuiltInHelpers,
     )
     .unwrap();
     assert_eq!(steps.advance(31).unwrap(), LiveStatus::Waiting);
@@ -127,7 +134,7 @@ fn a_live_world_goes_on_while_the_person_chooses() {
 #[test]
 fn steps_move_the_person_and_name_objects_by_pixel() {
     let config = config(AgentId::PARTNER, InputLevel::Steps, "none");
-    let mut session = LiveSession::start(&episode(), &config).unwrap();
+    let mut session = LiveSession::start(&episode(), &config, &BuiltInHelpers).unwrap();
     let pose = |session: &LiveSession| session.env.world().state().agents[0].pose;
     let before = pose(&session);
     for action in [Action::TurnLeft, Action::MoveForward, Action::Wait { frames: 3 }] {
@@ -148,7 +155,7 @@ fn steps_move_the_person_and_name_objects_by_pixel() {
 fn a_branch_continues_a_trace() {
     let episode = episode();
     let whole = config(AgentId::PARTNER, InputLevel::Plans, "rhp");
-    let mut session = LiveSession::start(&episode, &whole).unwrap();
+    let mut session = LiveSession::start(&episode, &whole, &BuiltInHelpers).unwrap();
     play(&mut session);
     let parent = session.trace();
     for (seat, frame) in [(AgentId::PARTNER, 300), (AgentId::PARTNER, 0)] {
@@ -175,7 +182,7 @@ fn a_branch_continues_a_trace() {
 fn a_trace_of_agents_that_act_otherwise_cannot_be_taken_over() {
     let episode = episode();
     let config = config(AgentId::PARTNER, InputLevel::Plans, "rhp");
-    let mut session = LiveSession::start(&episode, &config).unwrap();
+    let mut session = LiveSession::start(&episode, &config, &BuiltInHelpers).unwrap();
     play(&mut session);
     let other = session.trace().replacen("\"helper\":\"rhp\"", "\"helper\":\"random\"", 1);
     let result = LiveSession::take_over(other.as_bytes(), &episode, 600, &config);
@@ -183,13 +190,19 @@ fn a_trace_of_agents_that_act_otherwise_cannot_be_taken_over() {
 }
 
 #[test]
-fn a_branch_has_the_image_size_of_its_trace() {
+fn a_branch_has_the_image_size_and_the_partner_of_its_trace() {
     let bytes = episode();
     let episode = Episode::parse(&bytes, "episode").unwrap();
-    let config_of_run =
-        EpisodeConfig { image_size: Some(128), ..EpisodeConfig::new(&episode, "rhp") };
-    let helper = helper("rhp", config_of_run.rules).unwrap();
-    let mut env = Env::new(config_of_run, helper).unwrap();
+    let name = "habits:load=1";
+    let config_of_run = EpisodeConfig {
+        image_size: Some(128),
+        partner: Some(name),
+        ..EpisodeConfig::new(&episode, "rhp")
+    };
+    let rules = config_of_run.rules.planner;
+    let agents =
+        EpisodeAgents::new(BuiltInHelpers.make("rhp", rules), built_in_partner(name, rules));
+    let mut env = Env::new(config_of_run, agents).unwrap();
     let mut trace = env.header().to_line() + "\n";
     let mut sink = |record: &Record| -> Result<(), AgentError> {
         trace += &(record.to_line() + "\n");
@@ -200,16 +213,27 @@ fn a_branch_has_the_image_size_of_its_trace() {
         let config = config(seat, InputLevel::Plans, "none");
         let branch = LiveSession::take_over(trace.as_bytes(), &bytes, 350, &config);
         assert_eq!(branch.unwrap().state().frame, 350);
+        let unknown = trace.replacen(name, "policy:0", 1);
+        let refused = LiveSession::take_over(unknown.as_bytes(), &bytes, 350, &config).err();
+        let is_refused = matches!(refused, Some(LiveError::NoPartner(_)));
+        assert_eq!(is_refused, seat == AgentId::HELPER, "{refused:?}");
     }
 }
 
 #[test]
 fn helpers_with_weights_and_other_seats_are_refused() {
     let start = |seat, helper| {
-        LiveSession::start(&episode(), &config(seat, InputLevel::Plans, helper)).err()
+        LiveSession::start(&episode(), &config(seat, InputLevel::Plans, helper), &BuiltInHelpers)
+            .err()
     };
-    assert!(matches!(start(AgentId::PARTNER, "rl"), Some(LiveError::NoHelper(_))));
+    assert!(matches!(
+        start(AgentId::PARTNER, "rl"),
+        Some(LiveError::Env(EnvError::UnknownHelper { .. }))
+    ));
     assert!(matches!(start(AgentId::CHILD, "none"), Some(LiveError::NoSeat(_))));
-    assert!(matches!(reference(&episode(), "rl", 0), Err(LiveError::NoHelper(_))));
+    assert!(matches!(
+        reference(&episode(), "rl", 0),
+        Err(LiveError::Env(EnvError::UnknownHelper { .. }))
+    ));
     assert!(reference(&episode(), "none", 0).unwrap() > 0.0);
 }

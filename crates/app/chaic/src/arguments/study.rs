@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
+use super::exec::{ExecArguments, HelperList, helpers};
 use super::ranges;
 
 /// `chaic study`.
@@ -71,6 +72,12 @@ pub struct StudyServeArguments {
     /// Name under which browsers reach the server, such as study.example.org; repeat it for several.
     #[arg(long = "host", value_name = "NAME")]
     pub hosts: Vec<String>,
+    /// Helper of your own that study.toml names: NAME=exec:COMMAND or NAME=policy:FILE; repeatable.
+    #[arg(long, value_name = "HELPER", value_parser = helpers)]
+    pub helper: Vec<HelperList>,
+    /// Grants and limits of helper processes.
+    #[command(flatten)]
+    pub exec: ExecArguments,
 }
 
 /// `chaic study export`.

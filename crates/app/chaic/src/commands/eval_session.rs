@@ -193,7 +193,7 @@ fn confined(
 pub(super) fn write_reports(run: &Run) -> Result<()> {
     let report = report_of(run);
     write_files(run.folder(), &report)?;
-    write_report(run.folder(), &report)?;
+    write_report(run.folder(), &report, &llm::shown_language(run.folder().path()))?;
     Ok(())
 }
 
@@ -205,12 +205,12 @@ pub(super) fn request(arguments: &EvalArguments) -> (RunRequest, &'static str) {
         tasks: task.as_ref().map(|t| t.0.clone()),
         helpers: arguments.helper_names(),
         split: split.clone(),
-        first: *n_episodes,
+        n_episodes: *n_episodes,
         seeds: *seeds,
-        size: *size,
+        image_size: *size,
         episodes: episodes.clone(),
         rules: *rules,
-        set: set.clone(),
+        rule_overrides: set.clone(),
         no_traces: arguments.no_traces,
         partner: arguments.partner.clone(),
         person: arguments.person,
@@ -220,7 +220,7 @@ pub(super) fn request(arguments: &EvalArguments) -> (RunRequest, &'static str) {
         track: arguments.track,
     };
     if request == RunRequest::default() && !arguments.resume {
-        return (RunRequest { first: Some(QUICK_EPISODES), ..request }, "quick");
+        return (RunRequest { n_episodes: Some(QUICK_EPISODES), ..request }, "quick");
     }
     (request, "eval")
 }

@@ -3,6 +3,7 @@
 use anyhow::{Result, bail};
 use chaic_arena::leaderboard::LeaderboardBuilder;
 use chaic_arena::{Evaluation, Leaderboard};
+use chaic_eval::EvalError;
 use chaic_files::{EntryKind, entries, kind, write_atomically};
 use serde_json::json;
 
@@ -18,7 +19,8 @@ pub fn run(command: &LeaderboardCommand, format: OutputFormat) -> Result<ExitSta
     let LeaderboardCommand::Build(arguments) = command;
     let out = &arguments.out;
     if out.extension().is_none_or(|extension| extension != "html") {
-        bail!("{} is no page; write a name that ends with .html", out.display());
+        let problem = format!("{} is no page; write a name that ends with .html", out.display());
+        return Err(EvalError::Options(problem).into());
     }
     let leaderboard = collect(arguments)?;
     let [json_path, csv_path] = ["json", "csv"].map(|extension| out.with_extension(extension));

@@ -6,8 +6,8 @@ use std::sync::atomic::AtomicBool;
 use anyhow::{Context as _, Result, bail};
 use chaic_agents::partners::{HabitsError, partner_habits};
 use chaic_core::AgentId;
-use chaic_env::EnvError;
 use chaic_env::helper_registry::{NONE, RULES};
+use chaic_env::{EnvError, RunKey};
 use chaic_eval::EvalError;
 use chaic_eval::replay::find_trace;
 use chaic_eval::run::RunFolder;
@@ -17,7 +17,7 @@ use chaic_llm::settings::Settings;
 use chaic_llm::show::{self, Detail};
 use chaic_llm::templates::Templates;
 use chaic_llm::{check, session};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::given_partners::is_partner_file;
 use super::{all_helper_names, all_partner_names, require_text};
@@ -59,6 +59,11 @@ pub fn run(command: &LlmCommand, format: OutputFormat) -> Result<ExitStatus> {
         }
     }
     Ok(ExitStatus::Success)
+}
+
+/// Returns a function that reads the prompts and answers of a run's episodes, for pages.
+pub fn shown_language(run: &Path) -> impl Fn(&RunKey) -> Value {
+    move |key| serde_json::to_value(show::agents(run, key)).expect("agents have string keys")
 }
 
 /// Formats the prompts, answers and choices of one episode run.

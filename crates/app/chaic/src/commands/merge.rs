@@ -7,6 +7,7 @@ use chaic_eval::suite::SuiteFolder;
 use chaic_page::write_report;
 
 use super::eval_partners::print_robustness;
+use super::llm::shown_language;
 use super::summary::{print_scores, report_of};
 use crate::arguments::MergeArguments;
 use crate::exit::ExitStatus;
@@ -27,7 +28,7 @@ pub fn run(arguments: &MergeArguments, format: OutputFormat) -> Result<ExitStatu
     if extent.finished > 0 {
         // The merge has written the other files of the report.
         let report = report_of(&run);
-        write_report(run.folder(), &report)?;
+        write_report(run.folder(), &report, &shown_language(run.folder().path()))?;
         print_scores(format, &report, run.folder(), &[])?;
     }
     Ok(ExitStatus::from_findings(missing > 0 || extent.errors > 0))
@@ -45,7 +46,7 @@ fn merge_partners(arguments: &MergeArguments, format: OutputFormat) -> Result<Ex
         let extent = run.progress();
         is_good &= extent.finished == extent.total && extent.errors == 0;
         if extent.finished > 0 {
-            write_report(run.folder(), &report_of(run))?;
+            write_report(run.folder(), &report_of(run), &shown_language(run.folder().path()))?;
         }
     }
     print_robustness(&folder, format, None)?;

@@ -88,7 +88,8 @@ fn report_robustness(arguments: &ReportArguments, format: Format) -> Result<Exit
 /// Prints the differences to the run in another folder.
 fn report_differences(report: &Report<'_>, path: &Path, format: Format) -> Result<ExitStatus> {
     if !matches!(format, Format::Table | Format::Markdown) {
-        anyhow::bail!("--baseline prints a table; choose --format text or md");
+        let problem = "--baseline prints a table; choose --format text or md";
+        return Err(EvalError::Options(problem.to_owned()).into());
     }
     let (folder, options) = RunFolder::read(path)?;
     let results = from_journal(&folder, &planned(&folder, &options).unwrap_or_default())?;

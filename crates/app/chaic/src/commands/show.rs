@@ -69,12 +69,14 @@ struct Progress {
 
 /// Formats the options that differ from the default, and the progress.
 fn options_text(options: &RunOptions, progress: &Progress, n_traces: usize) -> String {
-    let RunOptions { split, first, seeds, size, rules, set, traces, track, .. } = options;
-    let episodes = first.map_or("all episodes".to_owned(), |n| format!("the first {n} episodes"));
+    let RunOptions { split, seeds, rules, rule_overrides, traces, track, .. } = options;
+    let episodes = options.n_episodes;
+    let episodes =
+        episodes.map_or("all episodes".to_owned(), |n| format!("the first {n} episodes"));
     let split =
         if split == FILES_SPLIT { "episode files".to_owned() } else { format!("split {split}") };
     let tasks: Vec<&str> = options.tasks.iter().map(|task| task.name()).collect();
-    let rules = [&[rules.to_string()], &set[..]].concat().join(", ");
+    let rules = [&[rules.to_string()], &rule_overrides[..]].concat().join(", ");
     let Progress { planned, finished, failed } = progress;
     let optional = |label: &'static str, value: Option<String>| value.map(|value| (label, value));
     let lines = [
@@ -83,7 +85,7 @@ fn options_text(options: &RunOptions, progress: &Progress, n_traces: usize) -> S
         Some(("Episodes", format!("{split}, {episodes} of each task, seeds: {seeds}"))),
         Some(("Rules", rules)),
         Some(("Track", track.to_string())),
-        optional("Images", size.map(|px| format!("{px} pixels"))),
+        optional("Images", options.image_size.map(|px| format!("{px} pixels"))),
         optional("Partner", options.partner.clone()),
         optional("Person", options.person.map(|kind| kind.to_string())),
         optional("Perception", options.perception.clone()),

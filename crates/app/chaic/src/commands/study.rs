@@ -8,6 +8,7 @@ use chaic_eval::trace_file;
 use chaic_export::lerobot::{LeRobotOptions, LeRobotWriter};
 use chaic_files::write_atomically;
 use chaic_page::study_page;
+use chaic_sandbox::Launcher;
 use chaic_study::deletion::{DERIVED, delete};
 use chaic_study::export::{VerifiedTrial, export};
 use chaic_study::{Balance, Plan, Seat, Simulator, Study, Trial, page_content, simulate};
@@ -28,9 +29,13 @@ const LEROBOT: (u32, u32) = (6, 256);
 const MAX_LISTED: usize = 20;
 
 /// Runs a command for studies.
-pub fn run(command: &StudyCommand, format: OutputFormat) -> Result<ExitStatus> {
+pub fn run(
+    command: &StudyCommand,
+    format: OutputFormat,
+    launcher: &Launcher,
+) -> Result<ExitStatus> {
     match command {
-        StudyCommand::Serve(arguments) => super::study_serve::run(arguments, format),
+        StudyCommand::Serve(arguments) => super::study_serve::run(arguments, format, launcher),
         StudyCommand::Check(arguments) => check(arguments, format),
         StudyCommand::Build(arguments) => build(arguments, format),
         StudyCommand::Export(arguments) => export_data(arguments, format),

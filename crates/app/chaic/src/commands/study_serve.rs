@@ -1,6 +1,7 @@
 //! `chaic study serve`. Needs the feature `study-server`.
 
 use anyhow::Result;
+use chaic_sandbox::Launcher;
 
 use crate::arguments::StudyServeArguments;
 use crate::exit::ExitStatus;
@@ -8,7 +9,11 @@ use crate::output::OutputFormat;
 
 /// Serves a study until Ctrl-C.
 #[cfg(feature = "study-server")]
-pub fn run(arguments: &StudyServeArguments, format: OutputFormat) -> Result<ExitStatus> {
+pub fn run(
+    arguments: &StudyServeArguments,
+    format: OutputFormat,
+    launcher: &Launcher,
+) -> Result<ExitStatus> {
     use std::time::Instant;
 
     use chaic_study::{Plan, Simulator, Study};
@@ -18,7 +23,7 @@ pub fn run(arguments: &StudyServeArguments, format: OutputFormat) -> Result<Exit
     use crate::interrupt;
     use crate::output::{counted, print_progress, print_result, print_warning, quoted_path};
 
-    let StudyServeArguments { study, data, listen, hosts } = arguments;
+    let StudyServeArguments { study, data, listen, hosts, .. } = arguments;
     let plan = Plan::new(Study::read(study)?, study)?;
     let (digest, slots) = (plan.digest().to_owned(), plan.study().participants);
     let goals = match plan.study().play.simulator {
@@ -30,8 +35,9 @@ pub fn run(arguments: &StudyServeArguments, format: OutputFormat) -> Result<Exit
     let options = ServerOptions { folder: data.clone(), listen: *listen, hosts: hosts.clone() };
     let start = Instant::now();
     let clock = Box::new(move || start.elapsed().as_secs());
-    let server = StudyServer::open(plan, &options, clock, Box::new(print_warning))?;
     let stop = interrupt::stop_flag()?;
+    let helpers = own_helpers::registry(arguments, &plan, launcher, stop)?;
+    let server = StudyServer::open(plan, &options, helpers, clock, Box::new(print_warning))?;
     let url = format!("http://{}/", server.address());
     let counts = server.counts();
     let text = format!(
@@ -64,9 +70,89 @@ pub fn run(arguments: &StudyServeArguments, format: OutputFormat) -> Result<Exit
     Ok(ExitStatus::Success)
 }
 
+/// Helpers that are not built in.
+#[cfg(feature = "study-server")]
+mod own_helpers {
+    use std::slice;
+    use std::sync::Arc;
+    use std::sync::atomic::AtomicBool;
+
+    use anyhow::Result;
+    use chaic_agents::perception_factory::GroundTruthPerceptionFactory;
+    use chaic_env::helper_registry::{BuiltInHelpers, HelperRegistry, find};
+    use chaic_env::rules::RuleSet;
+    use chaic_eval::EvalError;
+    use chaic_learn::helpers::{NamedPolicy, PolicyRegistry};
+    use chaic_sandbox::Launcher;
+    use chaic_study::{Plan, Simulator};
+    use chaic_subprocess::CommandRegistry;
+
+    use crate::arguments::{HelperArgument, StudyServeArguments};
+
+    /// Returns all helpers of the server. They live as long as the process.
+    pub(super) fn registry(
+        arguments: &StudyServeArguments,
+        plan: &Plan,
+        launcher: &Launcher,
+        stop: &'static AtomicBool,
+    ) -> Result<&'static dyn HelperRegistry> {
+        let given: Vec<&HelperArgument> =
+            arguments.helper.iter().flat_map(|list| &list.0).collect();
+        if !given.is_empty() && plan.study().play.simulator == Simulator::Page {
+            return Err(invalid(
+                "--helper needs `play.simulator = \"server\"` in study.toml: a page has no own helpers",
+            ));
+        }
+        let (mut programs, mut policies) = (Vec::new(), Vec::new());
+        for helper in &given {
+            match helper {
+                HelperArgument::Names(names) => {
+                    return Err(invalid(&format!(
+                        "--helper {} has no command; write NAME=exec:COMMAND or NAME=policy:FILE, and name \
+                         built-in helpers in study.toml alone",
+                        names.join(",")
+                    )));
+                }
+                HelperArgument::Exec { name, line } => {
+                    programs.push(arguments.exec.command(name, line));
+                }
+                HelperArgument::Policy { name, file } => {
+                    policies.push(NamedPolicy::read(name, file)?);
+                }
+            }
+        }
+        for name in given.iter().flat_map(|helper| helper.names()) {
+            if !plan.helpers().contains(name.as_str()) {
+                let problem = "no condition of the study has the helper";
+                return Err(invalid(&format!("{problem} `{name}`; name it in study.toml")));
+            }
+        }
+        for program in &mut programs {
+            arguments.exec.confine(program, launcher, slice::from_ref(&arguments.data))?;
+        }
+        let perception = Arc::new(GroundTruthPerceptionFactory);
+        let policies =
+            PolicyRegistry::bundled(&BuiltInHelpers, perception).with_policies(policies)?;
+        let policies = Box::leak(Box::new(policies));
+        let registry = Box::leak(Box::new(CommandRegistry::new(policies, programs, stop)?));
+        if plan.study().play.simulator == Simulator::Server {
+            for name in plan.helpers() {
+                find(registry, name, RuleSet::PAPER.planner).map_err(|problem| {
+                    invalid(&format!("{problem}; give your own with --helper NAME=exec:COMMAND"))
+                })?;
+            }
+        }
+        Ok(registry)
+    }
+
+    fn invalid(problem: &str) -> anyhow::Error {
+        EvalError::Options(problem.to_owned()).into()
+    }
+}
+
 /// Refuses, since this build has no server.
 #[cfg(not(feature = "study-server"))]
-pub fn run(_: &StudyServeArguments, _: OutputFormat) -> Result<ExitStatus> {
+pub fn run(_: &StudyServeArguments, _: OutputFormat, _: &Launcher) -> Result<ExitStatus> {
     anyhow::bail!(
         "this build has no study server; install one that has it: `cargo install --path crates/app/chaic \
          --features study-server`"

@@ -15,7 +15,7 @@ use chaic_env::helper_registry::{HelperRegistry, NONE};
 use chaic_eval::report::{rounded, write_files};
 use chaic_eval::run::{FolderMode, Run, RunFolder, RunProgress, RunRequest};
 use chaic_files::write_atomically;
-use chaic_page::write_report;
+use chaic_page::{no_language, write_report};
 use chaic_sandbox::Launcher;
 use chaic_subprocess::conformance::check;
 use serde_json::json;
@@ -242,7 +242,7 @@ fn play_run(
     }
     let report = report_of(&run);
     write_files(run.folder(), &report)?;
-    write_report(run.folder(), &report)?;
+    write_report(run.folder(), &report, &no_language)?;
     let RunProgress { total, errors, .. } = run.progress();
     let json = json!({ "run": path, "episode_runs": total, "failed": errors });
     let failed = if errors > 0 { format!("; failed, zero each: {errors}") } else { String::new() };

@@ -9,6 +9,7 @@ use chaic_files::write_atomically;
 use chaic_page::{page, read_replays};
 use serde_json::json;
 
+use super::llm::shown_language;
 use crate::arguments::ViewArguments;
 use crate::exit::ExitStatus;
 use crate::output::{OutputFormat, counted, print_result, print_warning, quoted_path};
@@ -30,7 +31,8 @@ pub fn run(arguments: &ViewArguments, format: OutputFormat) -> Result<ExitStatus
     }
     let paths: Vec<PathBuf> =
         found.iter().take(*max as usize).map(|(path, _)| path.clone()).collect();
-    let (replays, warnings) = read_replays(&folder, &options, &paths)?;
+    let (replays, warnings) =
+        read_replays(&folder, &options, &paths, &shown_language(folder.path()))?;
     warnings.iter().for_each(|warning| print_warning(&warning.to_string()));
     let page = page(&format!("chaic: replays of {}", run.display()), None, &replays);
     let out = out.clone().unwrap_or_else(|| folder.path().join(FILE_NAME));

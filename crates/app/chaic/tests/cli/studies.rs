@@ -138,3 +138,26 @@ fn a_study_is_served_if_the_build_has_the_server() {
     assert!(refused.contains(&format!("{CODE}.jsonl, line 1: no record")), "{refused}");
     assert_eq!(refused.lines().count(), 1, "{refused}");
 }
+
+#[cfg(feature = "study-server")]
+#[test]
+fn wrong_helpers_of_a_server_are_refused() {
+    let dir = tempfile::tempdir().expect("the disk has space");
+    let at = dir.path();
+    write_study(at);
+    let refused = |helper: &[&str], words: &str| {
+        let serve = ["study", "serve", "study.toml", "--data", "data", "--listen", "127.0.0.1:0"];
+        let error = run_err(at, &[&serve[..], helper].concat());
+        assert!(error.contains(words), "{error}");
+    };
+    let mine = ["--helper", "mine=exec:true"];
+    refused(&mine, "--helper needs `play.simulator = \"server\"`");
+    let server = STUDY
+        .replace("\"rhp\"]", "\"mine\"]")
+        .replace("[factors]", "[play]\nsimulator = \"server\"\n\n[factors]");
+    fs::write(at.join("study.toml"), server).expect("the disk has space");
+    refused(&[], "unknown helper `mine`");
+    refused(&["--helper", "rhp"], "--helper rhp has no command");
+    refused(&[&mine[..], &["--helper", "other=exec:true"]].concat(), "the helper `other`");
+    refused(&["--helper", "mine=policy:none.safetensors"], "none.safetensors");
+}

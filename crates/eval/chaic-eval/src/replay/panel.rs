@@ -1,10 +1,7 @@
 //! One image of a replay: the views of both agents, the map, captions and events.
 
-use chaic_core::Vec3;
-use chaic_core::agent::BelievedObject;
-use chaic_core::geom::Camera;
 use chaic_core::observation::Images;
-use chaic_env::narration::Caption;
+use chaic_env::narration::{Caption, DetectedObject};
 use chaic_env::trace::Header;
 use chaic_render::text::{self, Align};
 use chaic_world::World;
@@ -39,7 +36,7 @@ pub(super) struct Contents<'a> {
     /// Views of partner and helper.
     pub views: &'a [Images],
     /// Objects that each of them believes to see.
-    pub believed: &'a [Vec<Mark>],
+    pub believed: &'a [Vec<DetectedObject>],
     pub map: &'a RgbImage,
     pub captions: &'a [Caption],
     /// Last events, newest last.
@@ -81,14 +78,6 @@ pub(super) fn compose(contents: &Contents<'_>) -> RgbImage {
     image
 }
 
-/// Label at the position where an agent believes to see an object.
-pub(super) struct Mark {
-    /// Position as fractions of the image's sides, from the left and the top.
-    at: [f32; 2],
-    label: String,
-    color: [u8; 3],
-}
-
 /// Returns the color of a label: the same in all images, and light enough to read on dark images.
 fn label_color(label: u8) -> [u8; 3] {
     [37u32, 91, 143].map(|m| (u32::from(label) * m % 160 + 95) as u8)
@@ -104,31 +93,19 @@ pub(super) fn tint(rgb: &mut [u8], pixels: &[u32], label: u8) {
     }
 }
 
-/// Returns the marks of believed objects that are in the camera's image.
-pub(super) fn marks(believed: &[BelievedObject], camera: &Camera) -> Vec<Mark> {
-    let mark = |object: &BelievedObject| {
-        let [x, y, z] = object.position_cm.map(|cm| 0.01 * cm as f32);
-        let (at, _) = camera.project(Vec3::new(x, y, z))?;
-        let at = [at.x / camera.width as f32, at.y / camera.height as f32];
-        let label = format!("{} {}", object.class.info().label, object.name);
-        // Pixel labels use 0 for the background.
-        let color = label_color(object.class.index() as u8 + 1);
-        at.iter().all(|x| (0.0..1.0).contains(x)).then_some(Mark { at, label, color })
-    };
-    believed.iter().filter_map(mark).collect()
-}
-
-fn draw_mark(image: &mut RgbImage, Mark { at, label, color }: &Mark) {
+fn draw_mark(image: &mut RgbImage, DetectedObject { class, label, at }: &DetectedObject) {
     /// Half the side of the dot, pixels.
     const DOT_PX: u32 = 2;
     const LABEL_PX: f32 = 12.0;
+    // Pixel labels use 0 for the background.
+    let color = label_color(class.index() as u8 + 1);
     let side = image.width();
     let [x, y] = at.map(|fraction| (fraction * side as f32) as u32);
     let (left, top) = (x.saturating_sub(DOT_PX), y.saturating_sub(DOT_PX));
     for (i, j) in (top..(y + DOT_PX).min(side))
         .flat_map(|j| (left..(x + DOT_PX).min(side)).map(move |i| (i, j)))
     {
-        image.put_pixel(i, j, Rgb(*color));
+        image.put_pixel(i, j, Rgb(color));
     }
     let start = (x + 2 * DOT_PX) as f32;
     let is_beside = start + text::width(label, LABEL_PX) < side as f32;
@@ -136,7 +113,7 @@ fn draw_mark(image: &mut RgbImage, Mark { at, label, color }: &Mark) {
     let y = (y as f32 - 0.5 * LABEL_PX).clamp(0.0, side as f32 - LABEL_PX);
     // A dark shadow keeps the text readable on light images.
     text::draw(image, (start + 1.0, y + 1.0), LABEL_PX, INK, align, label);
-    text::draw(image, (start, y), LABEL_PX, *color, align, label);
+    text::draw(image, (start, y), LABEL_PX, color, align, label);
 }
 
 fn draw_header(image: &mut RgbImage, Contents { header, world, .. }: &Contents<'_>) {

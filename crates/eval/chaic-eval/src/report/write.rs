@@ -208,15 +208,16 @@ impl Report<'_> {
 
     /// Returns the heading, with the options of the run.
     fn heading(&self) -> String {
-        let RunOptions { split, first, seeds, size, rules, set, partner, person, track, .. } =
+        let RunOptions { split, seeds, rules, rule_overrides, partner, person, track, .. } =
             self.options;
         let track =
             if *track == Track::default() { String::new() } else { format!(" Track: `{track}`.") };
-        let episodes = first.map_or("all".to_owned(), |n| format!("first {n}"));
+        let episodes = self.options.n_episodes.map_or("all".to_owned(), |n| format!("first {n}"));
+        let size = self.options.image_size;
         let size = size.map_or("as each agent requests".to_owned(), |px| format!("{px} pixels"));
-        let played_by = match set[..] {
+        let played_by = match rule_overrides[..] {
             [] => rules.to_string(),
-            _ => format!("{rules} with {}", set.join(", ")),
+            _ => format!("{rules} with {}", rule_overrides.join(", ")),
         };
         let driven = partner.as_ref();
         let driven = driven.map_or(String::new(), |p| format!(" The partner is driven by `{p}`."));

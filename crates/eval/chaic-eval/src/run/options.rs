@@ -32,16 +32,18 @@ pub struct RunOptions {
     /// Split; `files` if the episodes are files.
     pub split: String,
     /// Number of episodes of each task, from the first; absent for all.
-    pub first: Option<u32>,
+    #[serde(rename = "first")]
+    pub n_episodes: Option<u32>,
     /// Number of seeds per episode.
     pub seeds: u32,
     /// Side of all agents' images, pixels; absent for the size that each agent requests.
-    pub size: Option<u32>,
+    #[serde(rename = "size")]
+    pub image_size: Option<u32>,
     /// Set of rules.
     pub rules: RuleSetName,
     /// Rules that override the set, as `NAME=VALUE`.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub set: Vec<String>,
+    #[serde(rename = "set", default, skip_serializing_if = "Vec::is_empty")]
+    pub rule_overrides: Vec<String>,
     /// True if traces are written. Without traces, a run needs little disk space but can't be
     /// verified or replayed.
     #[serde(default = "default_true", skip_serializing_if = "is_true")]
@@ -93,17 +95,17 @@ pub struct RunRequest {
     /// `--split`.
     pub split: Option<Split>,
     /// `--n-episodes`.
-    pub first: Option<u32>,
+    pub n_episodes: Option<u32>,
     /// `--seeds`.
     pub seeds: Option<u32>,
     /// `--size`.
-    pub size: Option<u32>,
+    pub image_size: Option<u32>,
     /// `--episodes`: a folder with episode files instead of a split.
     pub episodes: Option<PathBuf>,
     /// `--rules`.
     pub rules: Option<RuleSetName>,
     /// `--set`, one entry per use.
-    pub set: Vec<String>,
+    pub rule_overrides: Vec<String>,
     /// `--no-traces`.
     pub no_traces: bool,
     /// `--partner`.
@@ -130,7 +132,7 @@ impl RunOptions {
     /// If an override names an unknown rule or an invalid value.
     pub fn rules(&self) -> Result<RuleSet> {
         let named = RuleSet::named(self.rules);
-        Ok(self.set.iter().try_fold(named, |rules, setting| rules.with(setting))?)
+        Ok(self.rule_overrides.iter().try_fold(named, |rules, setting| rules.with(setting))?)
     }
 
     /// Returns the digest of all options as compact JSON.
@@ -153,11 +155,11 @@ impl RunOptions {
             FILES => option("episodes", Some("DIR".to_owned())),
             split => option("split", (split != Split::Test.to_string()).then(|| split.to_owned())),
         }
-        option("n-episodes", self.first.map(|n| n.to_string()));
+        option("n-episodes", self.n_episodes.map(|n| n.to_string()));
         option("seeds", (self.seeds != 1).then(|| self.seeds.to_string()));
-        option("size", self.size.map(|px| px.to_string()));
+        option("size", self.image_size.map(|px| px.to_string()));
         option("rules", (self.rules != RuleSetName::Paper).then(|| self.rules.to_string()));
-        for setting in &self.set {
+        for setting in &self.rule_overrides {
             option("set", Some(setting.clone()));
         }
         option("partner", self.partner.clone());
@@ -189,11 +191,11 @@ impl RunRequest {
     /// If options contradict each other or are out of range.
     pub fn new_options(&self) -> Result<RunOptions> {
         let invalid = |text: String| Err(EvalError::Options(text));
-        let (seeds, size) = (self.seeds.unwrap_or(1), self.size);
-        if seeds == 0 || self.first == Some(0) {
+        let (seeds, image_size) = (self.seeds.unwrap_or(1), self.image_size);
+        if seeds == 0 || self.n_episodes == Some(0) {
             return invalid("--seeds and --n-episodes are at least 1".to_owned());
         }
-        if let Some(px) = size.filter(|s| !(MIN_IMAGE_SIZE..=MAX_IMAGE_SIZE).contains(s)) {
+        if let Some(px) = image_size.filter(|s| !(MIN_IMAGE_SIZE..=MAX_IMAGE_SIZE).contains(s)) {
             let range = format!("{MIN_IMAGE_SIZE} to {MAX_IMAGE_SIZE}");
             return invalid(format!("--size is {px}, expected {range} pixels"));
         }
@@ -215,8 +217,6 @@ impl RunRequest {
         if tasks.is_empty() || helpers.is_empty() {
             return invalid("a run needs at least one task and one helper".to_owned());
         }
-        let (first, rules) = (self.first, self.rules.unwrap_or(RuleSetName::Paper));
-        let (set, traces) = (self.set.clone(), !self.no_traces);
         let partner =
             self.partner.as_deref().filter(|name| *name != RULES).map(recorded_partner_name);
         let appearance = self.appearance.filter(|a| *a != Appearance::Canonical);
@@ -224,12 +224,12 @@ impl RunRequest {
             tasks,
             helpers,
             split,
-            first,
+            n_episodes: self.n_episodes,
             seeds,
-            size,
-            rules,
-            set,
-            traces,
+            image_size,
+            rules: self.rules.unwrap_or(RuleSetName::Paper),
+            rule_overrides: self.rule_overrides.clone(),
+            traces: !self.no_traces,
             partner,
             person: self.person,
             appearance: appearance.map(|a| a.to_string()),
@@ -266,13 +266,17 @@ impl RunRequest {
                 self.episodes.as_ref().filter(|_| !has_files).map(|p| p.display().to_string()),
                 number(None),
             ),
-            ("--n-episodes", self.first.map(|n| n.to_string()), number(recorded.first)),
+            ("--n-episodes", self.n_episodes.map(|n| n.to_string()), number(recorded.n_episodes)),
             ("--seeds", self.seeds.map(|n| n.to_string()), recorded.seeds.to_string()),
             ("--rules", self.rules.map(|r| r.to_string()), recorded.rules.to_string()),
             (
                 "--set",
-                (!self.set.is_empty()).then(|| self.set.join(" ")),
-                if recorded.set.is_empty() { number(None) } else { recorded.set.join(" ") },
+                (!self.rule_overrides.is_empty()).then(|| self.rule_overrides.join(" ")),
+                if recorded.rule_overrides.is_empty() {
+                    number(None)
+                } else {
+                    recorded.rule_overrides.join(" ")
+                },
             ),
             (
                 "--partner",
@@ -300,7 +304,7 @@ impl RunRequest {
                 recorded.behavior.clone().unwrap_or_else(|| GROUND_TRUTH.to_owned()),
             ),
             ("--track", self.track.map(|t| t.to_string()), recorded.track.to_string()),
-            ("--size", self.size.map(|n| n.to_string()), number(recorded.size)),
+            ("--size", self.image_size.map(|n| n.to_string()), number(recorded.image_size)),
             (
                 "--no-traces",
                 self.no_traces.then(|| "on".to_owned()),

@@ -140,7 +140,7 @@ fn episodes(
     task: TaskId,
     max: usize,
 ) -> Result<Vec<EpisodePlan>> {
-    let limit = options.first.map_or(usize::MAX, |n| n as usize);
+    let limit = options.n_episodes.map_or(usize::MAX, |n| n as usize);
     if options.split == FILES {
         let plan = |e: &Episode| {
             let (id, horizon) = (e.id().to_owned(), e.setup().horizon);

@@ -132,7 +132,7 @@ fn request(files: &tempfile::TempDir, helpers: &[&str]) -> RunRequest {
     RunRequest {
         helpers: Some(helpers.iter().map(|h| (*h).to_owned()).collect()),
         seeds: Some(2),
-        size: Some(SIZE),
+        image_size: Some(SIZE),
         episodes: Some(files.path().to_owned()),
         ..RunRequest::default()
     }
@@ -421,7 +421,8 @@ fn folders_are_locked_and_checked() {
 
 #[test]
 fn a_run_of_a_split_is_not_resumed_with_episode_files() {
-    let recorded = RunRequest { first: Some(1), ..RunRequest::default() }.new_options().unwrap();
+    let recorded =
+        RunRequest { n_episodes: Some(1), ..RunRequest::default() }.new_options().unwrap();
     let request = RunRequest { episodes: Some("mine".into()), ..RunRequest::default() };
     let error = request.resumed_options(&recorded, Path::new("run")).unwrap_err().to_string();
     assert!(error.contains("--episodes not given, not mine"), "{error}");

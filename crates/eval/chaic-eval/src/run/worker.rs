@@ -234,7 +234,7 @@ impl WorkerPool<'_> {
             seed: key.seed,
             rules,
             partner: name,
-            image_size: self.options.size,
+            image_size: self.options.image_size,
             appearance: self.options.appearance()?,
             ..EpisodeConfig::new(&episode, &key.helper)
         };

@@ -312,6 +312,10 @@ impl Agent for VisualHelper {
         Ok(self.encoder.begin(action_space, action_index).action)
     }
 
+    fn observe(&mut self, observation: &Observation) {
+        self.encoder.observe(observation);
+    }
+
     fn perception(&self) -> Option<String> {
         self.encoder.agent.perception()
     }

@@ -538,7 +538,7 @@ fn episode_files_in_a_run_of_a_split_are_ignored() {
         episodes: None,
         split: Some(chaic_episodes::Split::Test),
         tasks: Some(vec![TaskId::LowTarget]),
-        first: Some(1),
+        n_episodes: Some(1),
         ..request(&dir, &["turner"])
     };
     let (run, _) = Run::open(&dir.path().join("run"), FolderMode::New, &request, &helpers).unwrap();

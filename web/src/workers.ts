@@ -1,0 +1,29 @@
+// Workers of a page.
+
+import type { Request, Response } from "./messages.js";
+
+/** Starts a worker; `onResponse` receives its messages, `onError` the reason if it stops. */
+export function startWorker(
+  program: string,
+  onResponse: (response: Response) => void,
+  onError: (message: string) => void,
+): Worker {
+  const url = URL.createObjectURL(new Blob([program], { type: "text/javascript" }));
+  const worker = new Worker(url);
+  URL.revokeObjectURL(url);
+  worker.onmessage = (event: MessageEvent<Response>) => onResponse(event.data);
+  worker.onerror = (event) => onError(event.message || "the worker has stopped");
+  return worker;
+}
+
+/** Sends one request to a worker of its own, and returns the response. */
+export function ask(program: string, request: Request): Promise<Response> {
+  return new Promise((resolve, reject) => {
+    const answered = (response: Response): void => {
+      worker.terminate();
+      resolve(response);
+    };
+    const worker = startWorker(program, answered, (message) => reject(new Error(message)));
+    worker.postMessage(request);
+  });
+}

@@ -293,9 +293,8 @@ test("a comparison shows both runs, and where they diverge", async () => {
   await page.close();
 });
 
-/** Stops the game, downloads its trace and verifies it on the command line. */
+/** Downloads the offered trace and verifies it on the command line. */
 async function verified(page, name) {
-  await page.getByRole("button", { name: "Stop here" }).click();
   const link = page.getByRole("link", { name: "Download the trace" });
   const file = join(folder, name);
   if (firefox) {
@@ -322,6 +321,7 @@ test("a game played by keyboard verifies on the command line, and can be watched
   const text = await page.locator("chaic-play header").innerText();
   assert.match(text, /wants something that you do not know/);
   assert.deepEqual(await findings(page), []);
+  await page.getByRole("button", { name: "Stop here" }).click();
   const trace = await verified(page, "game.jsonl");
   assert.match(trace, /"helper":"human"/);
   await page.getByRole("button", { name: "Watch the replay" }).click();
@@ -413,6 +413,7 @@ test("a person takes over from a frame of a replay", async () => {
   await pictures(page, 300);
   await page.locator("chaic-replay .link", { hasText: "partner" }).click();
   await playTo(page, 400);
+  await page.getByRole("button", { name: "Stop here" }).click();
   const trace = await verified(page, "branch.jsonl");
   assert.match(trace, /"partner":"human"/);
   const choice = page.locator("#choice");
@@ -426,9 +427,10 @@ test("a person takes over from a frame of a replay", async () => {
 });
 
 test("another helper goes on from a frame of a replay", async () => {
-  const { page } = await open(view);
-  const label = await page.locator("#choice option", { hasText: "infer" }).getAttribute("value");
-  await page.goto(`file://${view}#${label}@300`);
+  const { page: first } = await open(view);
+  const index = await first.locator("#choice option", { hasText: "infer" }).getAttribute("value");
+  await first.close();
+  const { page } = await open(view, `#${index}@300`);
   await shown(page);
   await pictures(page, 300);
   await page.getByLabel("Helper that takes over").selectOption("oracle");

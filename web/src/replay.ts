@@ -218,7 +218,7 @@ export class ChaicReplay extends LitElement {
       this.dispatchEvent(new CustomEvent("go-on", { detail: { frame: this.frame, helper } }));
     };
     if (this.problem) return nothing;
-    return html`<p>
+    return html`<p class="seats">
       Take over from here as the
       ${viewers(info).map(
         ({ id, name }) => html`<button type="button" class="link" @click=${() => takeOver(id)}>${name}</button> `,

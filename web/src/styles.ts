@@ -438,6 +438,13 @@ export const styles = css`
   meter {
     width: 100%;
   }
+  .seats button:not(.link),
+  .seats select,
+  .language button {
+    font: inherit;
+    min-height: 2rem;
+    padding: 0 0.5rem;
+  }
   .language pre {
     max-height: 24rem;
     overflow-y: auto;

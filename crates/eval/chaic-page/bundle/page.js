@@ -465,6 +465,13 @@
   meter {
     width: 100%;
   }
+  .seats button:not(.link),
+  .seats select,
+  .language button {
+    font: inherit;
+    min-height: 2rem;
+    padding: 0 0.5rem;
+  }
   .language pre {
     max-height: 24rem;
     overflow-y: auto;
@@ -720,7 +727,7 @@
         </div>
         <figcaption>Map${this.shown?.belief?"; ring: believed position of the partner":""}</figcaption>
       </figure>
-    </div>`}seats(e){let s=n=>{this.playback.seek(this.frame),this.dispatchEvent(new CustomEvent("take-over",{detail:{frame:this.frame,seat:n,seed:e.seed}}))},r=()=>{this.playback.seek(this.frame);let n=this.successor?.value??"";this.dispatchEvent(new CustomEvent("go-on",{detail:{frame:this.frame,helper:n}}))};return this.problem?m:h`<p>
+    </div>`}seats(e){let s=n=>{this.playback.seek(this.frame),this.dispatchEvent(new CustomEvent("take-over",{detail:{frame:this.frame,seat:n,seed:e.seed}}))},r=()=>{this.playback.seek(this.frame);let n=this.successor?.value??"";this.dispatchEvent(new CustomEvent("go-on",{detail:{frame:this.frame,helper:n}}))};return this.problem?m:h`<p class="seats">
       Take over from here as the
       ${it(e).map(({id:n,name:o})=>h`<button type="button" class="link" @click=${()=>s(n)}>${o}</button> `)}
       ${e.successors.length>0?h`or let another helper go on:

@@ -84,7 +84,8 @@ fn a_trained_policy_is_a_helper() {
     let config = fs::read_to_string(at.join("u/config.toml")).expect("it exists");
     assert!(config.contains("image_size = 32"), "{config}");
     let helper = "none,mine=policy:u/policy.safetensors";
-    let eval = ["eval", "--task", "low_target", "--first", "1", "--out", "run", "--helper"];
+    let few = ["--task", "low_target", "--first", "1", "--size", "64"];
+    let eval = [&["eval"], &few[..], &["--out", "run", "--helper"]].concat();
     let report = run_ok(at, &[&eval[..], &[helper]].concat());
     assert!(report.contains("mine") && report.contains("w/o"), "{report}");
     run_ok(at, &["verify", "run"]);
@@ -108,7 +109,7 @@ fn a_bundled_helper_is_listed_played_and_verified() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = folder.path();
     assert!(run_ok(at, &["list", "helpers"]).contains("cloned"));
-    let eval = ["eval", "--task", "low_target", "--first", "1", "--out", "run"];
+    let eval = ["eval", "--task", "low_target", "--first", "1", "--size", "64", "--out", "run"];
     run_ok(at, &[&eval[..], &["--helper", "cloned"]].concat());
     run_ok(at, &["verify", "run"]);
     // run.json and the trace name the weights.

@@ -161,7 +161,7 @@ mod traps {
             &["report", "trap"],
             &["eval", "--resume", "--out", "trap"],
             &["merge", "--out", "merged", "trap"],
-            &["replay", "trap", "no_constraint/gen/0", "--out", "r.gif"],
+            &["replay", "trap", "no_constraint/gen/0", "--every", "40", "--out", "r.gif"],
             &["export", "lerobot", "trap", "--agent", "partner", "--out", "data"],
         ];
         for name in ["results.jsonl", "run.json", TRACE] {

@@ -157,12 +157,15 @@ function replayElement(source: Source, start: number): ChaicReplay {
 /** Lets another helper go on from a frame of a replay, and shows both runs beside each other. */
 async function goOn(source: Source, frame: number, helper: string): Promise<void> {
   const place = document.getElementById("play")!;
+  const shown = document.getElementById("player")!.firstElementChild;
   const status = document.createElement("p");
   status.setAttribute("role", "status");
   status.textContent = `The helper ${helper} goes on ...`;
   place.replaceChildren(status);
   const { module, trace: from, episode } = source;
   const response = await ask(workerSource(), { type: "continue", module, trace: from, episode, frame, helper });
+  // A game or another helper took the place meanwhile.
+  if (!status.isConnected) return;
   if (response.type !== "trace") {
     status.textContent = `The helper ${helper} cannot go on: ${response.type === "error" ? response.message : response.type}`;
     return;
@@ -171,6 +174,8 @@ async function goOn(source: Source, frame: number, helper: string): Promise<void
   status.textContent = `The helper ${helper} went on.`;
   const branch = { ...source, trace: encoder.encode(trace), language: [] };
   place.append(traceOffer(trace, () => showElement(replayElement(branch, frame))));
+  // Another replay was selected meanwhile.
+  if (document.getElementById("player")!.firstElementChild !== shown) return;
   const element = document.createElement("chaic-compare") as ChaicCompare;
   showElement(Object.assign(element, { sources: [source, branch], workerSource: workerSource(), start: frame }));
 }

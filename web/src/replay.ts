@@ -228,7 +228,7 @@ export class ChaicReplay extends LitElement {
             <select class="successor" aria-label="Helper that takes over">
               ${info.successors.map((name) => html`<option ?selected=${name === "oracle"}>${name}</option>`)}
             </select>
-            <button type="button" @click=${goOn}>Go on and compare</button>`
+            <button type="button" ?disabled=${this.frame >= info.last_frame} @click=${goOn}>Go on and compare</button>`
         : nothing}
     </p>`;
   }

@@ -18,12 +18,13 @@ export function startWorker(
 
 /** Sends one request to a worker of its own, and returns the response. */
 export function ask(program: string, request: Request): Promise<Response> {
-  return new Promise((resolve, reject) => {
+  return new Promise((resolve) => {
     const answered = (response: Response): void => {
       worker.terminate();
       resolve(response);
     };
-    const worker = startWorker(program, answered, (message) => reject(new Error(message)));
+    const failed = (message: string): void => answered({ type: "error", message });
+    const worker = startWorker(program, answered, failed);
     worker.postMessage(request);
   });
 }

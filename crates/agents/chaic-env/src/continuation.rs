@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::atomic::AtomicBool;
 
+use chaic_agents::PlannerRules;
 use chaic_core::agent::Thought;
 use chaic_core::memory_view::MemoryView;
 use chaic_core::observation::SensorConfig;
@@ -13,7 +14,7 @@ use crate::agent_slot::EpisodeAgents;
 use crate::config::EpisodeConfig;
 use crate::env::Env;
 use crate::error::EnvError;
-use crate::helper_registry::{Helper, HelperRegistry, find};
+use crate::helper_registry::{BuiltInHelpers, Helper, HelperRegistry, find};
 use crate::playback::Playback;
 use crate::trace::{BranchPoint, Decision, Header, Record, Trace, parse};
 
@@ -26,23 +27,33 @@ pub enum ContinuationError {
     /// An agent cannot decide.
     #[error(transparent)]
     Agent(#[from] AgentError),
-    /// A person or process is the partner, or the trace has no helper.
+    /// The helper cannot take over, or the partner cannot act again.
     #[error("{0}")]
     Agents(String),
+    /// The trace ends before the frame.
+    #[error("the trace ends at frame {last_frame}; take an earlier frame than {from}")]
+    End {
+        /// Wanted frame.
+        from: Frame,
+        /// Last frame of the trace.
+        last_frame: Frame,
+    },
     /// The agents act differently than in the trace, such as those of another version.
     #[error("the other agents do not act as in the trace before frame {0}; take an earlier frame")]
     Diverged(Frame),
 }
 
 /// Plays an episode again as in a trace (JSON lines) up to a frame, from which on the helper `name`
-/// decides. It observes the turns before. Returns a trace that names the other one as its branch point.
+/// decides. The helper observes all earlier turns ([`Agent::observe`]). Returns a new trace whose `branch_of`
+/// names the original trace.
 ///
-/// The records before the frame equal those of the other trace. Seed, rules, appearance and image size are
-/// those of the other trace. The partner acts again by its rules.
+/// Seed, rules, appearance and image size are those of the original trace. The partner acts again by its rules.
+/// The records before the frame are those of the original trace, with an empty first thought if its helper
+/// recorded none.
 ///
 /// # Errors
-/// [`ContinuationError`] if the trace is unreadable or altered, has no helper or a partner that cannot act
-/// again, or if `name` is unknown or cannot decide.
+/// [`ContinuationError`] if the trace is unreadable or altered or ends before the frame, has no helper or a
+/// partner that cannot act again, or if the helper is unknown, has no grant of ids or cannot decide.
 pub fn continue_with(
     bytes: &[u8],
     episode: &Episode,
@@ -66,7 +77,12 @@ pub fn continue_with(
         image_size,
         appearance: header.appearance,
     };
-    let expected = Playback::new(&trace, episode)?.digest_at(from)?;
+    let playback = Playback::new(&trace, episode)?;
+    let last_frame = playback.last_frame();
+    if from >= last_frame {
+        return Err(ContinuationError::End { from, last_frame });
+    }
+    let expected = playback.digest_at(from)?;
     let mut env = Env::new(config, agents)?;
     let mut records = Vec::new();
     let mut sink = |record: &Record| {
@@ -91,15 +107,47 @@ fn new_helper(
     name: &str,
     helpers: &dyn HelperRegistry,
 ) -> Result<Helper, ContinuationError> {
-    let has_helper = trace.header.people.iter().any(|person| person.agent == AgentId::HELPER);
-    let helper = find(helpers, name, trace.header.rules.planner)?.filter(|_| has_helper);
-    let Helper { agent, grants } = helper.ok_or_else(|| {
-        ContinuationError::Agents("without a helper, no other helper can take over".to_owned())
-    })?;
+    let refused = |problem: &str| Err(ContinuationError::Agents(problem.to_owned()));
+    if !trace.header.people.iter().any(|person| person.agent == AgentId::HELPER) {
+        return refused("the trace has no helper whom another one could replace");
+    }
+    match find(helpers, name, trace.header.rules.planner)? {
+        Some(helper) if helper.grants.ids => Ok(repeating(helper, trace, from)),
+        Some(_) => refused("the helper has no grant of ids, which recorded actions need"),
+        None => refused("name a helper that takes over"),
+    }
+}
+
+/// Returns a helper that repeats the decisions of a trace up to a frame, and decides from there on.
+fn repeating(helper: Helper, trace: &Trace, from: Frame) -> Helper {
     let before = |decision: &&Decision| decision.agent == AgentId::HELPER && decision.frame < from;
     let decisions = trace.decisions().filter(before).cloned().collect();
+    let Helper { agent, grants } = helper;
     let agent = Successor { agent, decisions, from, thought: Some(Thought::default()) };
-    Ok(Helper { agent: Box::new(agent), grants })
+    Helper { agent: Box::new(agent), grants }
+}
+
+/// Built-in helpers that take over in a trace: before, they repeat its decisions.
+pub struct Successors<'a> {
+    trace: &'a Trace,
+    from: Frame,
+}
+
+impl Successors<'_> {
+    /// Returns the helpers if the helper of a trace took over, as in one of [`continue_with`].
+    pub fn of(trace: &Trace) -> Option<Successors<'_>> {
+        trace.header.helper_takes_over().map(|from| Successors { trace, from })
+    }
+}
+
+impl HelperRegistry for Successors<'_> {
+    fn names(&self) -> Vec<String> {
+        BuiltInHelpers.names()
+    }
+
+    fn make(&self, name: &str, rules: PlannerRules) -> Option<Helper> {
+        Some(repeating(BuiltInHelpers.make(name, rules)?, self.trace, self.from))
+    }
 }
 
 /// Returns the partner of a trace, if it deviates from the rules.
@@ -140,10 +188,11 @@ impl Agent for Successor {
             return self.agent.act(observation);
         }
         self.agent.observe(observation);
-        let decision = self.decisions.pop_front().filter(|decision| decision.frame == frame);
-        let decision = decision.ok_or_else(|| {
-            AgentError::Broken(format!("the trace has no decision of the helper at frame {frame}"))
-        })?;
+        let due = self.decisions.pop_front_if(|decision| decision.frame == frame);
+        let Some(decision) = due else {
+            // The partner engages the helper in a joint lift in this frame, which replaces any action.
+            return Ok(Action::Wait { frames: 1 });
+        };
         self.thought = decision.thought.or(self.thought.take());
         Ok(decision.action.map(Target::Entity))
     }

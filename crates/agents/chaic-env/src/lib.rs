@@ -71,7 +71,7 @@ pub use agent_slot::{AgentSlot, Driver, EpisodeAgents, NoopAgent, agent_slots, w
 pub use batch::{EnvBatch, ImageLayout, SlotId};
 pub use chaic_render::{Appearance, ImagesMut};
 pub use config::{EpisodeConfig, trace_header};
-pub use continuation::{ContinuationError, continue_with};
+pub use continuation::{ContinuationError, Successors, continue_with};
 pub use digest::Digest;
 pub use env::{AdvanceOutcome, Env, EnvSnapshot};
 pub use error::{EnvError, Result};

@@ -13,6 +13,7 @@ use serde_json::json;
 use tokio::sync::Semaphore;
 
 use crate::access::AllowedHosts;
+use crate::limits::WAITING_THREADS;
 use crate::refusal::Refusal;
 use crate::sessions::Sessions;
 use crate::store::Store;
@@ -47,14 +48,24 @@ pub struct Play {
     /// Digest of the page, which stands for that of the study in answers.
     pub page_digest: String,
     /// Permits of the threads that simulate and draw.
-    pub threads: Semaphore,
+    pub threads: Arc<Semaphore>,
+}
+
+/// Returns the number of threads that simulate and draw. Threads that wait for other processes need no core.
+pub fn n_play_threads(has_own_helpers: bool) -> usize {
+    let n_cores = available_parallelism().map_or(1, NonZeroUsize::get);
+    if has_own_helpers { n_cores + WAITING_THREADS } else { n_cores }
 }
 
 impl Play {
     /// Creates the state without open episodes.
-    pub fn new(page_digest: String, helpers: &'static dyn HelperRegistry) -> Play {
-        let n_threads = available_parallelism().map_or(1, NonZeroUsize::get);
-        Play { sessions: Sessions::new(helpers), page_digest, threads: Semaphore::new(n_threads) }
+    pub fn new(
+        page_digest: String,
+        helpers: &'static dyn HelperRegistry,
+        n_threads: usize,
+    ) -> Play {
+        let threads = Arc::new(Semaphore::new(n_threads));
+        Play { sessions: Sessions::new(helpers), page_digest, threads }
     }
 }
 
@@ -93,7 +104,7 @@ pub fn refusal_response(app: &App, refusal: &Refusal) -> Response {
             StatusCode::UNPROCESSABLE_ENTITY
         }
         Refusal::Unfinished => StatusCode::FORBIDDEN,
-        Refusal::Busy => StatusCode::SERVICE_UNAVAILABLE,
+        Refusal::Busy | Refusal::InProgress | Refusal::Ending => StatusCode::SERVICE_UNAVAILABLE,
         Refusal::Size(_) => StatusCode::PAYLOAD_TOO_LARGE,
         Refusal::Changed | Refusal::File(_) => StatusCode::INTERNAL_SERVER_ERROR,
     };

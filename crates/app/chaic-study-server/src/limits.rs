@@ -22,6 +22,8 @@ pub const REQUEST_TIMEOUT: Duration = Duration::from_secs(60);
 pub const STOP_TIMEOUT: Duration = Duration::from_secs(10);
 /// Threads that write files.
 pub const WRITER_THREADS: usize = 16;
+/// Additional threads that simulate, if helpers of the study are other processes.
+pub const WAITING_THREADS: usize = 32;
 /// Requests of one participant. The page sends one at a time, with all records that wait.
 pub const PARTICIPANT_RATE: Rate = Rate { burst: 100, per_sec: 20 };
 /// New participants: a class that begins at once, then five a second.
@@ -37,8 +39,10 @@ pub const VIEW_PX: [u32; 2] = [512, 64];
 pub const TURN_RATE: Rate = Rate { burst: 60, per_sec: 20 };
 /// Maximum number of episodes in memory: see the measured size of an episode in docs/studies.md.
 pub const MAX_SESSIONS: usize = 200;
-/// Time without a turn after which another participant gets the memory of an episode, seconds.
+/// Time without a turn after which an episode leaves the memory, seconds.
 pub const SESSION_IDLE_SECS: u64 = 300;
+/// Interval at which such episodes are looked for.
+pub const IDLE_INTERVAL: Duration = Duration::from_secs(30);
 /// Simulated time after which the trace of a running episode is stored, also without a decision, frames.
 pub const RECORD_FRAMES: u32 = 15;
 

@@ -105,10 +105,14 @@ async fn simulate<T: Send + 'static>(
     let token = token.ok_or_else(|| refusal_response(&app, &Refusal::Token))?;
     app.store.authorize(&code, &token).map_err(|refusal| refusal_response(&app, &refusal))?;
     let Some(play) = app.play.clone() else { return Err(no_such_page()) };
-    let waiting = Arc::clone(&play);
-    let _permit = waiting.threads.acquire().await.expect("it is never closed");
+    let permit = Arc::clone(&play.threads).acquire_owned().await.expect("it is never closed");
     let shared = Arc::clone(&app);
-    match spawn_blocking(move || perform(&shared, &play, &code, &token)).await {
+    let work = move || {
+        // The thread is taken until the work ends, also if nobody waits for the answer.
+        let _permit = permit;
+        perform(&shared, &play, &code, &token)
+    };
+    match spawn_blocking(work).await {
         Ok(performed) => performed.map_err(|refusal| refusal_response(&app, &refusal)),
         Err(_) => Err(server_failure(&app)),
     }

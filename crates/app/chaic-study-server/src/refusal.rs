@@ -1,5 +1,6 @@
 //! Reasons why the server refuses a request of a participant.
 
+use chaic_core::AgentError;
 use chaic_files::FileError;
 use chaic_web::LiveError;
 
@@ -61,11 +62,26 @@ pub enum Refusal {
     Busy,
     /// The simulator or the helper has a problem, which the researcher sees.
     #[error("the episode cannot go on")]
-    Simulator(#[from] LiveError),
+    Simulator(LiveError),
+    /// An earlier request for the episode is not answered yet.
+    #[error("an earlier request is not answered yet; repeat it in a second")]
+    InProgress,
+    /// The server ends while the helper decides. The episode goes on after the next start.
+    #[error("the server ends; repeat it after its next start")]
+    Ending,
     /// The file of the participant was changed while the server ran.
     #[error("another program has changed the file of the participant")]
     Changed,
     /// A file operation failed.
     #[error("the server cannot store data now")]
     File(#[from] FileError),
+}
+
+impl From<LiveError> for Refusal {
+    fn from(error: LiveError) -> Refusal {
+        match error {
+            LiveError::Agent(AgentError::Halted(_)) => Refusal::Ending,
+            error => Refusal::Simulator(error),
+        }
+    }
 }

@@ -11,7 +11,7 @@ use axum::Router;
 use axum::http::HeaderValue;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use chaic_env::helper_registry::{HelperRegistry, find};
+use chaic_env::helper_registry::{BuiltInHelpers, HelperRegistry, NONE, find};
 use chaic_env::rules::RuleSet;
 use chaic_page::{study_page, study_page_without_simulator, study_script};
 use chaic_study::{Plan, Simulator, page_content};
@@ -26,10 +26,10 @@ use tokio::sync::Semaphore;
 use tokio::time::{sleep, timeout};
 
 use crate::access::{AllowedHosts, is_host_name};
-use crate::app::{App, Clock, Play, Reporter};
+use crate::app::{App, Clock, Play, Reporter, n_play_threads};
 use crate::error::{Result, ServerError};
 use crate::limits::{
-    HEADER_TIMEOUT, MAX_CONNECTIONS, MAX_HEADER_BYTES, STOP_TIMEOUT, WRITER_THREADS,
+    HEADER_TIMEOUT, IDLE_INTERVAL, MAX_CONNECTIONS, MAX_HEADER_BYTES, STOP_TIMEOUT, WRITER_THREADS,
 };
 use crate::routes::router;
 use crate::store::{Counts, Store};
@@ -82,9 +82,12 @@ impl StudyServer {
             return Err(ServerError::NoHostName(*listen));
         }
         let refused = |error| ServerError::Listen { address: *listen, error };
+        let is_simulated_here = plan.study().play.simulator == Simulator::Server;
+        let has_own_helpers = plan.helpers().iter().any(|name| !is_built_in(name));
+        let n_threads = if is_simulated_here { n_play_threads(has_own_helpers) } else { 0 };
         let runtime = Builder::new_multi_thread()
             .worker_threads(THREADS)
-            .max_blocking_threads(WRITER_THREADS)
+            .max_blocking_threads(WRITER_THREADS + n_threads)
             .enable_all()
             .build()
             .map_err(refused)?;
@@ -93,13 +96,12 @@ impl StudyServer {
         let mut content = page_content(&plan);
         content["server"] = json!(true);
         let title = &plan.study().title;
-        let is_simulated_here = plan.study().play.simulator == Simulator::Server;
         let page_digest = content["digest"].as_str().unwrap_or_default().to_owned();
         let (page, play) = if is_simulated_here {
             for name in plan.helpers() {
                 find(helpers, name, RuleSet::PAPER.planner)?;
             }
-            let play = Arc::new(Play::new(page_digest, helpers));
+            let play = Arc::new(Play::new(page_digest, helpers, n_threads));
             (study_page_without_simulator(title, &content), Some(play))
         } else {
             (study_page(title, &content), None)
@@ -132,10 +134,26 @@ impl StudyServer {
             tokio::net::TcpListener::from_std(listener)
         };
         let listener = listener.map_err(|error| ServerError::Listen { address, error })?;
+        if let Some(play) = app.play.clone() {
+            runtime.spawn(close_idle(Arc::clone(&app), play));
+        }
         runtime.block_on(serve(listener, router(Arc::clone(&app)), stop));
         // Waits for writes in progress.
         drop(runtime);
         Ok(app.store.counts())
+    }
+}
+
+/// Returns whether a helper runs in this process.
+fn is_built_in(name: &str) -> bool {
+    name == NONE || BuiltInHelpers.names().iter().any(|known| known == name)
+}
+
+/// Closes episodes without turns, with the processes of their helpers.
+async fn close_idle(app: Arc<App>, play: Arc<Play>) {
+    loop {
+        sleep(IDLE_INTERVAL).await;
+        play.sessions.close_idle((app.clock)());
     }
 }
 

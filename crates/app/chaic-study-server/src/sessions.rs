@@ -6,7 +6,8 @@
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
+use std::thread;
 
 use axum::body::Bytes;
 use chaic_core::{AgentId, Frame, Target};
@@ -122,7 +123,7 @@ impl Sessions {
     ) -> Result<String, Refusal> {
         let running = store.running_trial(code, token, trial, now_secs)?;
         let open = self.entry(code, trial, now_secs)?;
-        let mut game = lock(&open.game);
+        let mut game = try_lock(&open.game)?;
         if game.is_none() {
             let simulated = Game::new(store.plan(), running.trial, &running.trace, self.helpers);
             *game = Some(simulated.inspect_err(|_| self.close(code))?);
@@ -158,7 +159,7 @@ impl Sessions {
         turn: &Turn,
     ) -> Result<Bytes, Refusal> {
         let open = self.find(code, trial)?;
-        let mut game = lock(&open.game);
+        let mut game = try_lock(&open.game)?;
         let game = game.as_mut().ok_or(Refusal::Closed)?;
         if let Some(answer) =
             game.answer.as_ref().filter(|_| number.checked_add(1) == Some(game.next))
@@ -166,7 +167,10 @@ impl Sessions {
             return Ok(answer.clone());
         }
         let done = game.turn(store, code, trial, number, turn);
-        if matches!(done, Err(Refusal::Over | Refusal::Unknown | Refusal::Simulator(_))) {
+        if matches!(
+            done,
+            Err(Refusal::Over | Refusal::Unknown | Refusal::Simulator(_) | Refusal::Ending)
+        ) {
             self.close(code);
         }
         done
@@ -182,7 +186,14 @@ impl Sessions {
 
     /// Closes the episode of a participant.
     pub fn close(&self, code: &str) {
-        lock(&self.open).remove(code);
+        let closed = lock(&self.open).remove(code);
+        drop_later(closed);
+    }
+
+    /// Closes the episodes that have had no turn for [`SESSION_IDLE_SECS`].
+    pub fn close_idle(&self, now_secs: u64) {
+        let closed = take_idle(&mut lock(&self.open), now_secs);
+        drop_later(closed);
     }
 
     fn find(&self, code: &str, trial: usize) -> Result<Arc<OpenSession>, Refusal> {
@@ -197,11 +208,9 @@ impl Sessions {
             known.last_used_secs.store(now_secs, Ordering::Relaxed);
             return Ok(Arc::clone(known));
         }
-        open.remove(code);
-        open.retain(|_, known| {
-            let last_used_secs = known.last_used_secs.load(Ordering::Relaxed);
-            now_secs.saturating_sub(last_used_secs) < SESSION_IDLE_SECS
-        });
+        let mut closed: Vec<Arc<OpenSession>> = open.remove(code).into_iter().collect();
+        closed.extend(take_idle(&mut open, now_secs));
+        drop_later(closed);
         if open.len() >= MAX_SESSIONS {
             return Err(Refusal::Busy);
         }
@@ -213,6 +222,35 @@ impl Sessions {
         });
         open.insert(code.to_owned(), Arc::clone(&created));
         Ok(created)
+    }
+}
+
+/// Removes the episodes that have had no turn for [`SESSION_IDLE_SECS`].
+fn take_idle(
+    open: &mut BTreeMap<String, Arc<OpenSession>>,
+    now_secs: u64,
+) -> Vec<Arc<OpenSession>> {
+    let is_idle = |known: &OpenSession| {
+        let last_used_secs = known.last_used_secs.load(Ordering::Relaxed);
+        now_secs.saturating_sub(last_used_secs) >= SESSION_IDLE_SECS
+    };
+    open.extract_if(.., |_, known| is_idle(known)).map(|(_, known)| known).collect()
+}
+
+/// Drops episodes on a thread of their own: the end of a helper's process can take seconds.
+fn drop_later(closed: impl IntoIterator<Item = Arc<OpenSession>>) {
+    let closed: Vec<Arc<OpenSession>> = closed.into_iter().collect();
+    if !closed.is_empty() {
+        thread::spawn(move || drop(closed));
+    }
+}
+
+/// Locks a mutex unless it is locked already.
+fn try_lock<T>(mutex: &Mutex<T>) -> Result<MutexGuard<'_, T>, Refusal> {
+    match mutex.try_lock() {
+        Ok(guard) => Ok(guard),
+        Err(TryLockError::Poisoned(poisoned)) => Ok(poisoned.into_inner()),
+        Err(TryLockError::WouldBlock) => Err(Refusal::InProgress),
     }
 }
 

@@ -11,7 +11,9 @@ use chaic_core::{
 use chaic_env::helper_registry::{BuiltInHelpers, HelperRegistry, find};
 use chaic_env::narration::{Caption, event_text, object_name};
 use chaic_env::trace::{BranchPoint, Header, Record, Trace};
-use chaic_env::{AdvanceOutcome, AgentSlot, Env, EnvError, EpisodeAgents, EpisodeConfig, Playback};
+use chaic_env::{
+    AdvanceOutcome, AgentSlot, Env, EnvError, EpisodeAgents, EpisodeConfig, Playback, Successors,
+};
 use chaic_episodes::{Episode, EpisodeError};
 use chaic_render::{Channels, Scene, View};
 use chaic_world::{EventKind, Setup};
@@ -266,7 +268,12 @@ impl LiveSession {
             partner: header.partner.as_deref(),
             ..EpisodeConfig::new(&episode, PERSON)
         };
-        let mut session = LiveSession::with(base, &config, &BuiltInHelpers)?;
+        let successors = Successors::of(&trace);
+        let helpers: &dyn HelperRegistry = match &successors {
+            Some(successors) => successors,
+            None => &BuiltInHelpers,
+        };
+        let mut session = LiveSession::with(base, &config, helpers)?;
         session.repeat(&trace, |session| session.env.world().state().frame >= from)?;
         if Playback::new(&trace, &episode)?.digest_at(from)? != session.env.digest() {
             return Err(LiveError::Diverged);

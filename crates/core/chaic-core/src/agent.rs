@@ -107,8 +107,8 @@ pub enum AgentError {
 /// An agent. It receives a briefing once, and is then asked for an action each time its last one
 /// ends.
 ///
-/// It receives all information through these three calls. Equal sequences of calls must lead to
-/// equal actions: draw random numbers from a [`crate::rng::RngStream`] seeded by the briefing.
+/// It receives all information through [`Agent::reset`], [`Agent::act`] and [`Agent::observe`]. Equal
+/// sequences of calls must lead to equal actions: draw random numbers from a [`crate::rng::RngStream`] seeded by the briefing.
 pub trait Agent: Send {
     /// Returns the required sensors; called once per episode, after [`Agent::reset`]. Only required
     /// channels are rendered, and only granted ones are provided.
@@ -123,8 +123,8 @@ pub trait Agent: Send {
     /// If the agent fails; it is not called again in this episode.
     fn act(&mut self, observation: &Observation) -> Result<Action, AgentError>;
 
-    /// Updates the memory without a decision, in a turn in which a recording decides for this body. An
-    /// agent that takes over later calls [`Agent::act`] from then on.
+    /// Updates the memory in a turn in which a recording decides for this body. An agent that takes over is
+    /// asked by [`Agent::act`] from then on; without this method it knows nothing of the turns before.
     fn observe(&mut self, _observation: &Observation) {}
 
     /// Returns the name of the perception model, if the agent uses an exchangeable one instead of

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Result, StudyError};
 use crate::forms::Form;
+use crate::plan::PERSON;
 
 /// Maximum size of `study.toml` and of each text, bytes: a text of 10,000 words.
 const MAX_TEXT_BYTES: u64 = 64 << 10;
@@ -399,8 +400,8 @@ pub(crate) fn helper_names() -> Vec<&'static str> {
 
 /// Returns whether a helper of this name can exist. A server can have other ones than a page.
 fn is_helper(name: &str, simulator: Simulator) -> bool {
-    helper_names().contains(&name)
-        || (simulator == Simulator::Server && check_new_name(name, &[], "").is_ok())
+    let is_valid = || name != PERSON && check_new_name(name, &[], "").is_ok();
+    helper_names().contains(&name) || (simulator == Simulator::Server && is_valid())
 }
 
 /// Returns a problem if an entry is repeated.

@@ -69,8 +69,8 @@ fn errors_name_the_key_and_the_expectation() {
         ("\"infer\"]", "\"deep\"]", "`helper` names `deep`; expected one of none, random"),
         (
             "\"infer\"]\n",
-            "\"my own\"]\n[play]\nsimulator = \"server\"\n",
-            "`helper` names `my own`; expected one of none",
+            "\"human\"]\n[play]\nsimulator = \"server\"\n",
+            "`helper` names `human`; expected one of none",
         ),
         ("\"rhp\", \"infer\"]", "\"none\"]", "`factors.helper` must have from 2 to 16 different"),
         ("\"none\", \"rhp\", \"infer\"]", "\"rhp\"]", "`factors.helper` must have from 2"),

@@ -1,31 +1,44 @@
 //! Promises: a continuation repeats the records before its frame, verifies, and knows what was seen before;
 //! what cannot be continued is refused.
 
-use chaic_agents::PlannerRules;
+use chaic_core::observation::Grants;
 use chaic_episodes::find_episode;
 
 use super::*;
-use crate::helper_registry::{BuiltInHelpers, NONE, built_in_partner};
+use crate::helper_registry::{NONE, built_in_partner};
+use crate::rules::RuleSet;
 use crate::{AgentRerun, RerunStatus};
 
 /// Frame from which the other helper decides.
 const FROM: Frame = 400;
 
 fn episode() -> Episode {
-    let mut setup = find_episode("no_constraint/test/00").unwrap().into_setup();
+    short_episode("no_constraint/test/00")
+}
+
+fn short_episode(id: &str) -> Episode {
+    let mut setup = find_episode(id).unwrap().into_setup();
     setup.horizon = 800;
-    Episode::new("no_constraint/test/00", "short", None, setup).unwrap()
+    Episode::new(id, "short", None, setup).unwrap()
 }
 
 /// Plays an episode with images of 64 pixels; returns the trace as a file.
 fn played(helper: &str, partner: Option<&str>) -> String {
-    let episode = episode();
-    let rules = PlannerRules::paper();
+    played_episode(&episode(), RuleSet::PAPER, helper, partner)
+}
+
+fn played_episode(
+    episode: &Episode,
+    rule_set: RuleSet,
+    helper: &str,
+    partner: Option<&str>,
+) -> String {
+    let rules = rule_set.planner;
     let made = partner.map(|name| built_in_partner(name, rules).unwrap());
     let agents = EpisodeAgents::new(BuiltInHelpers.make(helper, rules), made);
-    let config = EpisodeConfig::new(&episode, helper);
-    let mut env =
-        Env::new(EpisodeConfig { image_size: Some(64), partner, ..config }, agents).unwrap();
+    let config = EpisodeConfig::new(episode, helper);
+    let config = EpisodeConfig { rules: rule_set, image_size: Some(64), partner, ..config };
+    let mut env = Env::new(config, agents).unwrap();
     let (header, mut records) = (env.header().clone(), Vec::new());
     let mut sink = |record: &Record| {
         records.push(record.clone());
@@ -94,6 +107,29 @@ fn a_helper_that_took_over_acts_again_as_recorded_and_remembers_what_was_before(
 }
 
 #[test]
+fn a_continuation_survives_joint_lifts_of_the_original_rules() {
+    let episode = short_episode("moving_house/test/00");
+    let parent = played_episode(&episode, RuleSet::COMPAT, "rhp", None);
+    assert!(parent.contains("lifted_together"), "the partner engages the helper");
+    let branch =
+        continue_with(parent.as_bytes(), &episode, 700, "random", &BuiltInHelpers).unwrap();
+    assert!(branch.end().is_some());
+}
+
+/// Helpers without grants.
+struct WithoutGrants;
+
+impl HelperRegistry for WithoutGrants {
+    fn names(&self) -> Vec<String> {
+        BuiltInHelpers.names()
+    }
+
+    fn make(&self, name: &str, rules: PlannerRules) -> Option<Helper> {
+        Some(Helper { grants: Grants::NONE, ..BuiltInHelpers.make(name, rules)? })
+    }
+}
+
+#[test]
 fn what_cannot_be_continued_is_refused() {
     let parent = played("rhp", None);
     let refused = |trace: &str, name: &str| continued(trace, name).unwrap_err();
@@ -104,7 +140,12 @@ fn what_cannot_be_continued_is_refused() {
     assert!(matches!(refused(&of_person, "rhp"), ContinuationError::Agents(_)));
     let altered = parent.replacen("[0,1,", "[1,1,", 1);
     assert!(matches!(refused(&altered, "rhp"), ContinuationError::Env(_)));
+    let bytes = parent.as_bytes();
+    let at_end = continue_with(bytes, &episode(), 800, "rhp", &BuiltInHelpers).unwrap_err();
+    assert!(matches!(at_end, ContinuationError::End { last_frame: 800, .. }), "{at_end}");
+    let unseen = continue_with(bytes, &episode(), FROM, "rhp", &WithoutGrants).unwrap_err();
+    assert!(unseen.to_string().contains("no grant of ids"), "{unseen}");
     let alone = played(NONE, None);
     let error = refused(&alone, "rhp").to_string();
-    assert!(error.contains("no other helper"), "{error}");
+    assert!(error.contains("the trace has no helper"), "{error}");
 }

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
+use std::time::Duration;
 
 use chaic_agents::PlannerRules;
 use chaic_core::observation::{Grants, SensorConfig};
@@ -50,26 +51,36 @@ simulator = "server"
 seat = "helper"
 "#;
 
-/// Built-in helpers, the helper `mine`, and the helper `broken`, which fails.
+/// Built-in helpers, `mine`, `broken`, which fails, `halted`, which the end of the server stops, and `slow`.
 pub struct TestHelpers;
 
 impl HelperRegistry for TestHelpers {
     fn names(&self) -> Vec<String> {
-        [BuiltInHelpers.names(), vec!["mine".to_owned(), "broken".to_owned()]].concat()
+        let own = ["mine", "broken", "halted", "slow"].map(str::to_owned);
+        BuiltInHelpers.names().into_iter().chain(own).collect()
     }
 
     fn make(&self, name: &str, rules: PlannerRules) -> Option<Helper> {
-        match name {
-            "mine" => BuiltInHelpers.make("rhp", rules),
-            "broken" => Some(Helper { agent: Box::new(BrokenAgent), grants: Grants::NONE }),
-            _ => BuiltInHelpers.make(name, rules),
-        }
+        let outcome = match name {
+            "mine" => return BuiltInHelpers.make("rhp", rules),
+            "broken" => Err(AgentError::Broken("no idea".to_owned())),
+            "halted" => Err(AgentError::Halted("the server ends".to_owned())),
+            "slow" => Ok(Action::TurnLeft),
+            _ => return BuiltInHelpers.make(name, rules),
+        };
+        Some(Helper { agent: Box::new(TestAgent { outcome }), grants: Grants::NONE })
     }
 }
 
-struct BrokenAgent;
+/// Time that the helper `slow` needs for a decision.
+pub const SLOW: Duration = Duration::from_millis(800);
 
-impl Agent for BrokenAgent {
+/// Agent with one answer.
+struct TestAgent {
+    outcome: Result<Action, AgentError>,
+}
+
+impl Agent for TestAgent {
     fn sensors(&self) -> SensorConfig {
         SensorConfig::NONE
     }
@@ -77,7 +88,10 @@ impl Agent for BrokenAgent {
     fn reset(&mut self, _: &Briefing) {}
 
     fn act(&mut self, _: &Observation) -> Result<Action, AgentError> {
-        Err(AgentError::Broken("no idea".to_owned()))
+        if self.outcome.is_ok() {
+            thread::sleep(SLOW);
+        }
+        self.outcome.clone()
     }
 }
 

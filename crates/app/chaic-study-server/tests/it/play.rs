@@ -11,7 +11,7 @@ use chaic_study_server::{
 use chaic_web::{InputLevel, LiveConfig, LiveInput, LiveSession, LiveStatus};
 use serde_json::{Value, json};
 
-use crate::kit::{Answer, Client, DEFINITION, Folder, SIMULATED, TestHelpers, code};
+use crate::kit::{Answer, Client, DEFINITION, Folder, SIMULATED, SLOW, TestHelpers, code};
 
 /// Side of the pictures of tests, pixels.
 const SIDE_PX: u32 = 64;
@@ -372,4 +372,40 @@ fn a_server_without_a_helper_of_the_study_does_not_start() {
     let unknown = SIMULATED.replace("seat = \"helper\"", "helper = \"theirs\"");
     let error = Folder::new(&unknown).try_server().err().expect("an error").to_string();
     assert!(error.contains("unknown helper `theirs`"), "{error}");
+}
+
+#[test]
+fn a_helper_that_decides_blocks_only_its_own_participant() {
+    let slow = SIMULATED.replace("seat = \"helper\"", "helper = \"slow\"");
+    let folder = Folder::new(&slow);
+    let server = folder.server();
+    let [client, other] = [server.client(1), server.client(2)];
+    for client in [&client, &other] {
+        client.begin();
+        client.open(0);
+    }
+    let turn = json!({ "frames": 1, "view_px": SIDE_PX });
+    std::thread::scope(|scope| {
+        let first = scope.spawn(|| client.turn(0, 0, &turn));
+        std::thread::sleep(SLOW / 4);
+        let repeated = client.turn(0, 0, &turn);
+        assert_eq!(repeated.status, 503, "{repeated:?}");
+        assert!(repeated.error().contains("not answered yet"), "{}", repeated.error());
+        assert_eq!(other.turn(0, 0, &turn).status, 200);
+        let first = first.join().expect("no panic");
+        assert_eq!(first.turn(), client.turn(0, 0, &turn).turn());
+    });
+}
+
+#[test]
+fn an_episode_whose_helper_is_stopped_with_the_server_can_go_on() {
+    let halted = SIMULATED.replace("seat = \"helper\"", "helper = \"halted\"");
+    let folder = Folder::new(&halted);
+    let server = folder.server();
+    let client = server.client(1);
+    client.begin();
+    client.open(0);
+    // The page repeats a request with this status.
+    assert_eq!(client.turn(0, 0, &json!({ "frames": 9, "view_px": SIDE_PX })).status, 503);
+    assert_eq!(client.open(0).status, 200, "the episode is still running");
 }

@@ -3,6 +3,7 @@
 
 use chaic_episodes::find_episode;
 
+use chaic_env::continue_with;
 use chaic_env::helper_registry::built_in_partner;
 
 use super::*;
@@ -218,6 +219,21 @@ fn a_branch_has_the_image_size_and_the_partner_of_its_trace() {
         let is_refused = matches!(refused, Some(LiveError::NoPartner(_)));
         assert_eq!(is_refused, seat == AgentId::HELPER, "{refused:?}");
     }
+}
+
+#[test]
+fn a_person_goes_on_as_the_partner_where_another_helper_has_taken_over() {
+    let bytes = episode();
+    let whole = config(AgentId::HELPER, InputLevel::Plans, "none");
+    let mut session = LiveSession::start(&bytes, &whole, &BuiltInHelpers).unwrap();
+    play(&mut session);
+    let episode = Episode::parse(&bytes, "episode").unwrap();
+    let parent = session.trace();
+    let branch = continue_with(parent.as_bytes(), &episode, 300, "rhp", &BuiltInHelpers).unwrap();
+    let branch: String = branch.lines().map(|line| line + "\n").collect();
+    let config = config(AgentId::PARTNER, InputLevel::Plans, "none");
+    let again = LiveSession::take_over(branch.as_bytes(), &bytes, 500, &config);
+    assert_eq!(again.unwrap().state().frame, 500);
 }
 
 #[test]

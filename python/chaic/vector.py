@@ -23,7 +23,8 @@ PARTS = ("rgb", "depth", "ids", "own")
 
 
 class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
-    """Helpers in ``num_envs`` worlds, each with its simulated partner; options as in ``chaic.gym.HelperEnv``.
+    """Helpers in ``num_envs`` worlds, each with its simulated partner. Options as in ``chaic.gym.HelperEnv``, without
+    ``action`` and ``perception``: actions are primitive, and an observation has no ``map``.
 
     The final observation of an episode is that of the last decision. ``copy=False`` is faster: each step then overwrites the
     arrays of the last observation. ``out`` maps parts of the observation to arrays to write into: NumPy arrays, or objects

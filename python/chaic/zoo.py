@@ -317,7 +317,11 @@ class PairParallelEnv(_PairBase, ParallelEnv[str, Obs, Any]):
 
 
 def env(task: str | Sequence[str] | None = None, **options: Any) -> PairEnv:
-    """Returns the AEC environment of a task; options as in ``chaic.gym.HelperEnv``."""
+    """Returns the AEC environment of a task.
+
+    Options as in ``chaic.gym.HelperEnv``, without ``action``, ``perception`` and ``partner_image_size``; an observation has no
+    ``map``. ``max_cycles`` limits the actions of each agent.
+    """
     return PairEnv(task, **options)
 
 

@@ -141,8 +141,8 @@ impl BehaviorModel for GroundTruthBehavior {
 }
 
 /// Infers what one person picks up from the observer's own memory, without grants. An object
-/// between the person's hands that was not there before counts as taken. An object that is seen
-/// again at its old position does not. The model cannot detect failed attempts, or where objects
+/// between the person's hands that was not there before counts as taken. If it is seen again at its old
+/// position, the pick-up is removed. The model cannot detect failed attempts, or where objects
 /// are put.
 #[derive(Clone, Debug)]
 pub struct InferredBehavior {

@@ -268,7 +268,7 @@ impl Executor {
         let Some(object) = s.memory.objects.get(track) else { return Progress::Failed };
         let is_heavy = object.class.info().role == Role::HeavyTarget;
         let is_ignored = !together && now < object.ignore_until;
-        if !object.is_present || object.is_gone || now < object.held_until || is_ignored {
+        if !object.is_present || object.is_out_of_play || now < object.held_until || is_ignored {
             return Progress::Failed;
         }
         let Some(hand) = hands.free_hand else { return Progress::Failed };

@@ -68,7 +68,7 @@ pub static HELPERS: [HelperInfo; 11] = [
         title: "Infer, no watching",
         about: "infer that does not follow the partner",
         make: |rules, factory| {
-            let options = InferOptions { watches: false, ..InferOptions::ALL };
+            let options = InferOptions { follows_partner: false, ..InferOptions::ALL };
             Box::new(infer(rules, factory, options))
         },
         grants: planner_grants,
@@ -78,7 +78,7 @@ pub static HELPERS: [HelperInfo; 11] = [
         title: "Infer, rules",
         about: "infer that follows the oracle's rules",
         make: |rules, factory| {
-            let options = InferOptions { plans: false, ..InferOptions::ALL };
+            let options = InferOptions { uses_team_planner: false, ..InferOptions::ALL };
             Box::new(infer(rules, factory, options))
         },
         grants: planner_grants,
@@ -104,14 +104,14 @@ pub static HELPERS: [HelperInfo; 11] = [
         name: "ideal_observer",
         title: "Ideal observer",
         about: "infer that sees everything; goal unknown",
-        make: |rules, factory| Box::new(observer(rules, factory)),
+        make: |rules, factory| Box::new(infer_with_granted_state(rules, factory)),
         grants: |_| Grants { behavior: true, positions: true, state: true, ..Grants::PLANNER },
     },
     HelperInfo {
         name: "oracle_plan",
         title: "Oracle plan",
         about: "upper bound: the planner of infer knows everything",
-        make: |rules, factory| Box::new(observer(rules, factory)),
+        make: |rules, factory| Box::new(infer_with_granted_state(rules, factory)),
         grants: |_| Grants::ALL,
     },
 ];
@@ -167,7 +167,7 @@ pub fn explore_unknown_area(rules: PlannerRules) -> PlannerRules {
 }
 
 /// Constructs an upper bound: the inferring helper with granted state and behavior.
-pub fn observer(
+pub fn infer_with_granted_state(
     rules: PlannerRules,
     factory: &dyn PerceptionFactory,
 ) -> PlanningAgent<InferPolicy> {

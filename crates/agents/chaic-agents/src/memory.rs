@@ -173,7 +173,7 @@ impl Memory {
         if self.rules.forgets_missing {
             self.objects.forget_missing(observation);
         }
-        self.objects.expire(before, self.frame);
+        self.objects.count_newly_available(before, self.frame);
         self.update_hands(observation, percepts.hands.as_ref());
         self.apply_grants(observation);
         if let Some(state) = &observation.granted.state {
@@ -227,7 +227,7 @@ impl Memory {
             }
         }
         for obstacle in &granted.removed {
-            self.objects.mark_gone((*obstacle).into());
+            self.objects.mark_out_of_play((*obstacle).into());
         }
         for (entity, class) in &granted.delivered {
             let track = TrackId::from(*entity);
@@ -236,7 +236,7 @@ impl Memory {
             self.assumed_delivered.remove(&track);
         }
         for track in &self.delivered {
-            self.objects.mark_gone(*track);
+            self.objects.mark_out_of_play(*track);
         }
     }
 
@@ -314,7 +314,7 @@ impl Memory {
         let delivered: Vec<TrackId> =
             percepts.detections.iter().filter(is_delivered).map(|d| d.track).collect();
         for track in delivered {
-            self.objects.mark_gone(track);
+            self.objects.mark_out_of_play(track);
         }
     }
 
@@ -322,7 +322,7 @@ impl Memory {
     pub fn assume_delivered(&mut self, track: TrackId, place: TrackId) {
         if self.delivered.insert(track) {
             self.assumed_delivered.insert(track, (place, self.frame));
-            self.objects.mark_gone(track);
+            self.objects.mark_out_of_play(track);
         }
     }
 

@@ -17,7 +17,7 @@ use crate::policies::{PartnerVariantPolicy, RecordedPolicy, RulePolicy, RuleProf
 pub use crate::policies::{PlanRecording, RecordedInteraction, RecordedStep, is_real_failure};
 use crate::rules::PlannerRules;
 
-/// Grants of a partner: perfect segmentation and its own goal.
+/// Grants of a partner: `ids`, `goal_place` and its own `goal`.
 pub const PARTNER_GRANTS: Grants = Grants::PARTNER;
 
 /// Returns the policy of a task's partner.

@@ -1,5 +1,5 @@
-//! Policies: rule-based, inferring, random, following the partner, of partners with other habits,
-//! repeating a recording, or controlled by a caller.
+//! Policies: the paper's rules, goal inference, random choice, following the partner, partners with other
+//! habits, recorded partners, and plans chosen by a caller.
 
 mod external;
 mod follow;

@@ -13,7 +13,7 @@ pub mod simulation;
 pub mod travel;
 
 pub use problem::{Operation, Place, PlaceKind, TeamProblem, Worker};
-pub use search::{SearchSettings, improve};
+pub use search::{SearchSettings, search_operations};
 pub use simulation::simulate;
 
 #[cfg(test)]

@@ -23,7 +23,7 @@ pub const MAX_PARTNERS: usize = 100;
 /// Maximum size of a list's file, bytes: a hundred partners with all parameters take 30 KiB.
 pub const MAX_FILE_BYTES: u64 = 256 << 10;
 
-/// A partner of a list: a mind and a body.
+/// Partner of a list: the agent that controls it, and its body.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SuitePartner {
@@ -59,7 +59,7 @@ struct BundledPartner {
     person: Option<&'static str>,
 }
 
-const fn mind(name: &'static str) -> BundledPartner {
+const fn agent(name: &'static str) -> BundledPartner {
     BundledPartner { name, partner: Some(name), person: None }
 }
 
@@ -69,15 +69,15 @@ const fn body(name: &'static str, person: &'static str) -> BundledPartner {
 
 /// Partners of the bundled suite. Every partner can play every task.
 static BUNDLED: [BundledPartner; 13] = [
-    mind("farthest"),
-    mind("shuffled"),
-    mind("noisy"),
-    mind("slow"),
-    mind("no_containers"),
-    mind("forgetful"),
-    mind("one_by_one"),
+    agent("farthest"),
+    agent("shuffled"),
+    agent("noisy"),
+    agent("slow"),
+    agent("no_containers"),
+    agent("forgetful"),
+    agent("one_by_one"),
     // The registry of chaic-learn creates it.
-    mind("cloned"),
+    agent("cloned"),
     body("fast_walker", "+speed150"),
     body("slow_walker", "+speed65"),
     body("tires_trembles", "+tires+tremor"),
@@ -95,13 +95,13 @@ impl SuitePartner {
         SuitePartner { name: RULES.to_owned(), partner: None, person: None }
     }
 
-    /// Draws the mind and the body of a partner.
+    /// Draws the habits and the body of a partner.
     pub fn drawn(name: String, seed: u64) -> SuitePartner {
         let partner = Some(PartnerHabits::draw(seed).to_string());
         SuitePartner { name, partner, person: PersonChange::draw(seed) }
     }
 
-    /// Returns the problem of an entry; its mind is one that no registry has to know, or a plain name.
+    /// Returns the problem of an entry; its agent is one that no registry has to know, or a plain name.
     fn problem(&self) -> Option<String> {
         let SuitePartner { name, partner, person } = self;
         let is_name = |c: char| c.is_ascii_alphanumeric() || "_-".contains(c);

@@ -229,8 +229,8 @@ fn remaining_distance_m(world: &World, agent: AgentId, index: usize) -> Option<f
     let (setup, state) = (world.setup(), world.state());
     let (class, object) = (setup.things[index].class, &state.objects[index]);
     let wanted = setup.goal.targets.iter().find(|(c, _)| *c == class).map_or(0, |(_, n)| *n);
-    let is_gone = object.delivered.is_some() || object.location == ObjectLocation::Broken;
-    if is_gone || world.n_delivered(class) >= wanted {
+    let is_out_of_play = object.delivered.is_some() || object.location == ObjectLocation::Broken;
+    if is_out_of_play || world.n_delivered(class) >= wanted {
         return None;
     }
     let position = state.agents.get(agent.index())?.pose.position;

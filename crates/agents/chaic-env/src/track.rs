@@ -17,9 +17,10 @@ use crate::rules::RuleSet;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Track {
-    /// Every helper has the grants that it asks for.
+    /// Helpers may have any grant that they ask for.
     #[default]
-    Told,
+    #[serde(rename = "told")]
+    Unrestricted,
     /// Helpers perceive pixels and their own body; the goal place is the only grant.
     Hidden,
 }
@@ -70,12 +71,12 @@ const DISCLOSING_RULES: [DisclosingRule; 4] = [
 
 impl Track {
     /// All tracks.
-    pub const ALL: [Track; 2] = [Track::Told, Track::Hidden];
+    pub const ALL: [Track; 2] = [Track::Unrestricted, Track::Hidden];
 
     /// Returns what the track allows and requires.
     pub const fn info(self) -> &'static TrackInfo {
         match self {
-            Track::Told => &TOLD,
+            Track::Unrestricted => &TOLD,
             Track::Hidden => &HIDDEN,
         }
     }
@@ -189,7 +190,7 @@ mod tests {
     fn the_hidden_track_refuses_each_grant_but_the_goal_place() {
         for (name, _) in Grants::NONE.named() {
             let grants = Grants::from_names([name]).unwrap();
-            assert_eq!(Track::Told.check_grants("mine", grants), Ok(()));
+            assert_eq!(Track::Unrestricted.check_grants("mine", grants), Ok(()));
             let checked = Track::Hidden.check_grants("mine", grants);
             if name == "goal_place" {
                 assert_eq!(checked, Ok(()));
@@ -214,12 +215,12 @@ mod tests {
         {
             assert!(check(perception, behavior).unwrap_err().contains("hidden track needs"));
         }
-        assert_eq!(Track::Told.check_perception(None, None), Ok(()));
+        assert_eq!(Track::Unrestricted.check_perception(None, None), Ok(()));
     }
 
     #[test]
     fn rules_that_disclose_are_named_with_what_to_set() {
-        assert_eq!(Track::Told.check_rules(&RuleSet::COMPAT), Ok(()));
+        assert_eq!(Track::Unrestricted.check_rules(&RuleSet::COMPAT), Ok(()));
         assert_eq!(Track::Hidden.check_rules(&RuleSet::PAPER), Ok(()));
         let refused = Track::Hidden.check_rules(&RuleSet::COMPAT).unwrap_err();
         let mut rules = RuleSet::COMPAT;
@@ -235,7 +236,7 @@ mod tests {
     #[test]
     fn the_hidden_track_needs_the_whole_sandbox_or_trust() {
         let partial = Some("sandbox without landlock");
-        assert_eq!(Track::Told.check_isolation("mine", partial), Ok(()));
+        assert_eq!(Track::Unrestricted.check_isolation("mine", partial), Ok(()));
         for whole in [None, Some("sandbox"), Some("trusted")] {
             assert_eq!(Track::Hidden.check_isolation("mine", whole), Ok(()));
         }

@@ -21,7 +21,7 @@ pub struct EndpointPreset {
 
 impl EndpointPreset {
     /// Returns the settings with the named values.
-    pub fn over(&self, mut settings: Settings) -> Settings {
+    pub fn apply_to(&self, mut settings: Settings) -> Settings {
         if let Some(url) = &self.url {
             settings.endpoint.url.clone_from(url);
         }
@@ -40,15 +40,15 @@ impl EndpointPreset {
     ///
     /// # Errors
     /// [`LlmError::NotNamed`] if one of them is missing.
-    pub fn over_recorded(&self, run: &Path, recorded: Settings) -> Result<Settings> {
+    pub fn apply_to_recorded(&self, run: &Path, recorded: Settings) -> Result<Settings> {
         let mut settings = recorded.clone();
         settings.endpoint.key_env = None;
         settings.endpoint.allow_http = false;
         if recorded.endpoint.url.is_empty() {
             // A replayed run has used no endpoint.
-            return Ok(self.over(settings));
+            return Ok(self.apply_to(settings));
         }
-        let settings = self.over(settings);
+        let settings = self.apply_to(settings);
         let used = settings.key_env();
         let is_key_named = self.key_env.is_some()
             || recorded.endpoint.key_env.as_ref().is_none_or(|name| *name == used);
@@ -92,7 +92,7 @@ mod tests {
         recorded: Settings,
     ) -> std::result::Result<(String, String), String> {
         let settings =
-            named.over_recorded(Path::new("run"), recorded).map_err(|e| e.to_string())?;
+            named.apply_to_recorded(Path::new("run"), recorded).map_err(|e| e.to_string())?;
         assert!(!settings.endpoint.allow_http, "only the user allows plain http");
         Ok((settings.endpoint.url.clone(), settings.key_env()))
     }

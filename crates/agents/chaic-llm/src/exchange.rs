@@ -85,7 +85,8 @@ pub enum Purpose {
     /// Choice after the reasoning.
     Choose,
     /// Repetition with a description of the problem.
-    Again,
+    #[serde(rename = "again")]
+    Retry,
 }
 
 /// Request: all inputs of the answer.

@@ -208,10 +208,10 @@ impl LanguagePolicy {
                 Err(problem) => problem,
             };
             self.count("invalid_answers", 1);
-            if purpose == Purpose::Again {
+            if purpose == Purpose::Retry {
                 return Ok((prompt, Outcome::Failed(DecisionSource::FallbackInvalid)));
             }
-            purpose = Purpose::Again;
+            purpose = Purpose::Retry;
             let repeated: String = text.chars().take(MAX_REPEATED).collect();
             // Some endpoints refuse empty messages.
             let repeated = if repeated.trim().is_empty() { "(nothing)" } else { &repeated };
@@ -241,7 +241,7 @@ impl LanguagePolicy {
             ("questions", 1),
             ("requests", exchange.requests()),
             ("faults", n_faults),
-            ("asked_again", u64::from(purpose == Purpose::Again)),
+            ("asked_again", u64::from(purpose == Purpose::Retry)),
             ("prompt_tokens", prompt),
             ("answer_tokens", answer),
             ("estimated_usage", u64::from(estimated)),

@@ -78,7 +78,7 @@ fn write_exchange(text: &mut String, exchange: &Exchange, detail: Detail) {
         Purpose::Decide => "asked",
         Purpose::Think => "asked to reason",
         Purpose::Choose => "asked to choose",
-        Purpose::Again => "asked again",
+        Purpose::Retry => "asked again",
     };
     let _ = writeln!(text, "\n=== frame {}: {purpose}, {}", exchange.frame, exchange.request_hash);
     for Passage { heading, text: content } in passages(exchange, detail) {
@@ -271,7 +271,7 @@ fn write_counts(text: &mut String, record: &DecisionLog) {
                 add("questions", 1);
                 add("requests", exchange.requests());
                 add("faults", exchange.faults.len() as u64);
-                add("asked again", u64::from(exchange.request.purpose == Purpose::Again));
+                add("asked again", u64::from(exchange.request.purpose == Purpose::Retry));
                 add("prompt tokens", exchange.usage().prompt);
                 add("answer tokens", exchange.usage().answer);
             }

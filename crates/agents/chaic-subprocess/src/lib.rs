@@ -13,8 +13,8 @@
 //! - A process that times out, fails, exceeds a limit or violates the protocol ends its own episode with a
 //!   message. It never blocks or ends a run.
 //! - A command runs in a sandbox (`chaic-sandbox`) unless its user trusts it, and traces record which.
-//! - No process outlives its episode. On Linux this includes all its descendants; elsewhere, descendants
-//!   that left its process group may remain.
+//! - No process outlives its episode, except those of a pool, which serve several episodes of a run. On Linux
+//!   this includes all its descendants; elsewhere, descendants that left its process group may remain.
 //! - A process inherits environment variables of an allow-list only, and so no API keys.
 //! - A command runs because the user named it, never because a run folder does.
 

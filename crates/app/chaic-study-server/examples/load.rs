@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 
 use chaic_env::helper_registry::BuiltInHelpers;
 use chaic_study::data::CODE_ALPHABET;
-use chaic_study::{Plan, Study};
+use chaic_study::{Study, StudyPlan};
 use chaic_study_server::{ServerOptions, StudyServer};
 use rustix::time::{ClockId, clock_gettime};
 use serde_json::{Value, json};
@@ -71,7 +71,7 @@ fn main() {
     let path = dir.path().join("study.toml");
     fs::write(&path, definition).expect("the disk has space");
     fs::write(dir.path().join("text.txt"), "Words.\n").expect("the disk has space");
-    let plan = Plan::new(Study::read(&path).expect("a study"), &path).expect("a plan");
+    let plan = StudyPlan::new(Study::read(&path).expect("a study"), &path).expect("a plan");
     let options = ServerOptions {
         folder: dir.path().join("data"),
         listen: "127.0.0.1:0".parse().expect("an address"),

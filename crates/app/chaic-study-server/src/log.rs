@@ -10,7 +10,7 @@ use chaic_files::{
     EntryKind, FileError, kind, open_for_append, read_bounded, remove_file, write_new_private,
 };
 use chaic_study::data::{DataRecord, TrialEnd};
-use chaic_study::{ParticipantData, Plan, RecordCheck, Simulator, Trial};
+use chaic_study::{ParticipantData, RecordCheck, Simulator, StudyPlan, Trial};
 
 use crate::access::TokenDigest;
 use crate::error::{Result, ServerError};
@@ -66,7 +66,7 @@ impl Log {
 
     /// Reads the file of a participant, without an incomplete last line, and removes that line. Returns the slot
     /// too.
-    pub fn read(plan: &Plan, code: &str, path: &Path, now_secs: u64) -> Result<(Log, u32)> {
+    pub fn read(plan: &StudyPlan, code: &str, path: &Path, now_secs: u64) -> Result<(Log, u32)> {
         let wrong = |line: usize, problem: String| ServerError::Data {
             path: path.to_owned(),
             line,
@@ -149,7 +149,7 @@ impl Log {
     /// are stored. Numbers count the records that the page has.
     pub fn append(
         &mut self,
-        plan: &Plan,
+        plan: &StudyPlan,
         from: usize,
         text: &str,
     ) -> std::result::Result<(), Refusal> {
@@ -187,7 +187,7 @@ impl Log {
     /// Appends the next lines of the trace of a running trial, and its end if the episode has ended.
     pub fn append_trace(
         &mut self,
-        plan: &Plan,
+        plan: &StudyPlan,
         trial: usize,
         text: String,
         has_ended: bool,
@@ -204,7 +204,7 @@ impl Log {
     /// Checks records and appends their lines.
     fn add(
         &mut self,
-        plan: &Plan,
+        plan: &StudyPlan,
         records: &[DataRecord],
         lines: String,
         wrong: impl Fn(usize, &str) -> Refusal,
@@ -278,12 +278,12 @@ impl Log {
 }
 
 /// Returns whether a stored line is one that the page has too.
-fn is_of_page(plan: &Plan, line: &str) -> bool {
+fn is_of_page(plan: &StudyPlan, line: &str) -> bool {
     plan.study().play.simulator == Simulator::Page || !line.starts_with(TRACE_BEGIN)
 }
 
 /// Refuses records of a page that only the server writes.
-fn from_page(plan: &Plan, record: DataRecord) -> std::result::Result<DataRecord, String> {
+fn from_page(plan: &StudyPlan, record: DataRecord) -> std::result::Result<DataRecord, String> {
     let is_of_server = match record {
         DataRecord::Trace { .. } => true,
         DataRecord::TrialEnd { outcome, .. } => outcome == TrialEnd::Ended,

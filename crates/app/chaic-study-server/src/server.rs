@@ -14,7 +14,7 @@ use base64::engine::general_purpose::STANDARD;
 use chaic_env::helper_registry::{BuiltInHelpers, HelperRegistry, NONE, find};
 use chaic_env::rules::RuleSet;
 use chaic_page::{study_page, study_page_without_simulator, study_script};
-use chaic_study::{Plan, Simulator, page_content};
+use chaic_study::{Simulator, StudyPlan, page_content};
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::GracefulShutdown;
@@ -68,7 +68,7 @@ impl StudyServer {
     /// # Errors
     /// [`ServerError`].
     pub fn open(
-        plan: Plan,
+        plan: StudyPlan,
         options: &ServerOptions,
         helpers: &'static dyn HelperRegistry,
         clock: Clock,

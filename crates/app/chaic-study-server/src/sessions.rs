@@ -12,7 +12,7 @@ use std::thread;
 use axum::body::Bytes;
 use chaic_core::{AgentId, Frame, Target};
 use chaic_env::helper_registry::HelperRegistry;
-use chaic_study::{Input, Plan, SEED, Seat, Trial, WorldPace};
+use chaic_study::{Input, SEED, Seat, StudyPlan, Trial, WorldPace};
 use chaic_web::{InputLevel, LiveConfig, LiveInput, LiveSession, LiveStatus};
 use serde::Deserialize;
 use serde_json::json;
@@ -257,7 +257,7 @@ fn try_lock<T>(mutex: &Mutex<T>) -> Result<MutexGuard<'_, T>, Refusal> {
 impl Game {
     /// Starts an episode, or goes on with its stored trace.
     fn new(
-        plan: &Plan,
+        plan: &StudyPlan,
         trial: Trial,
         trace: &str,
         helpers: &dyn HelperRegistry,
@@ -330,7 +330,7 @@ impl Game {
 }
 
 /// Returns the configuration with which the page plays a trial.
-fn live_config(plan: &Plan, trial: Trial) -> LiveConfig {
+fn live_config(plan: &StudyPlan, trial: Trial) -> LiveConfig {
     let condition = &plan.conditions()[trial.condition];
     LiveConfig {
         seed: SEED,

@@ -10,7 +10,7 @@ use chaic_files::{
     remove_file,
 };
 use chaic_study::data::{DataRecord, is_code};
-use chaic_study::{Plan, RecordCheck, SlotHolder, Trial, lowest_free_slot};
+use chaic_study::{RecordCheck, SlotHolder, StudyPlan, Trial, lowest_free_slot};
 
 use crate::access::TokenDigest;
 use crate::error::{Result, ServerError};
@@ -30,7 +30,7 @@ const SECS_PER_MINUTE: u64 = 60;
 /// start.
 /// `chaic_study::SlotTable` has claims instead, which the files do not have.
 pub struct Store {
-    plan: Plan,
+    plan: StudyPlan,
     folder: PathBuf,
     participants: Mutex<Participants>,
     _lock: FolderLock,
@@ -89,7 +89,7 @@ impl Store {
     ///
     /// # Errors
     /// If the folder is in use, or a file is not one of this study.
-    pub fn open(plan: Plan, folder: &Path, now_secs: u64) -> Result<Store> {
+    pub fn open(plan: StudyPlan, folder: &Path, now_secs: u64) -> Result<Store> {
         create_folders(folder)?;
         let lock = FolderLock::acquire(folder)?;
         let mut by_code = BTreeMap::new();
@@ -240,7 +240,7 @@ impl Store {
     }
 
     /// Returns the plan of the study.
-    pub fn plan(&self) -> &Plan {
+    pub fn plan(&self) -> &StudyPlan {
         &self.plan
     }
 
@@ -344,7 +344,7 @@ impl Store {
 
 impl Participant {
     /// Reads the file of a participant.
-    fn read(plan: &Plan, code: &str, path: &Path, now_secs: u64) -> Result<Participant> {
+    fn read(plan: &StudyPlan, code: &str, path: &Path, now_secs: u64) -> Result<Participant> {
         let (log, slot) = Log::read(plan, code, path, now_secs)?;
         Ok(Participant {
             slot,

@@ -394,7 +394,7 @@ pub struct ObjectState {
     pub container: Option<EntityId>,
     /// True if the object is out of play: delivered, or broken.
     #[serde(default, skip_serializing_if = "is_false")]
-    pub is_gone: bool,
+    pub is_out_of_play: bool,
 }
 
 impl ObjectState {

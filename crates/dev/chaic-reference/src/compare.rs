@@ -182,7 +182,7 @@ fn find_differences(turn: &Turn<'_>, world: &World, events: &[Event]) -> Vec<Str
         let draws = [person.n_break, person.n_take, person.n_put_on, person.n_put_in];
         let n = agent.draws;
         d.check(of("draws"), draws, [n.breaks, n.takes, n.puts_on, n.puts_in]);
-        if let Some(condition) = state.conditions.get(k) {
+        if let Some(condition) = state.impairment_states.get(k) {
             let drops = [person.n_slip, person.n_drop];
             d.check(of("draws of tremor"), drops, [condition.slips, condition.drops]);
             let is_equal = (person.fatigue - condition.fatigue).abs() < FATIGUE_TOLERANCE;

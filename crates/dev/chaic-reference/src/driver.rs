@@ -81,8 +81,8 @@ impl Driver {
         }
         if has_moved {
             let mut bytes = postcard::to_stdvec(&state).expect("a state is plain data");
-            if !state.conditions.is_empty() {
-                bytes = postcard::to_extend(&state.conditions, bytes)
+            if !state.impairment_states.is_empty() {
+                bytes = postcard::to_extend(&state.impairment_states, bytes)
                     .expect("conditions are plain data");
             }
             world.restore(&Snapshot(bytes)).expect("the snapshot is of this world");

@@ -254,7 +254,7 @@ impl InputGenerator {
             stuck_frames: 0,
             child_is_away: false,
             over: false,
-            conditions: vec![],
+            impairment_states: vec![],
         }
     }
 

@@ -1,7 +1,8 @@
 //! Contests: sealed splits, submissions, scores and leaderboards.
 //!
 //! **What it is**: an organizer holds a [`Secret`] and publishes a [`Commitment`] to it. A [`SealedSplit`]
-//! derives the seeds of its episodes and partners from the secret, so they are unknown until it is.
+//! derives the seeds of its episodes and partners from the secret, so they stay unknown until the organizer
+//! publishes it.
 //! Authors send a [`Submission`] in an [`archive`]. An [`Evaluation`] holds its run on the sealed split and
 //! its [`SubmissionScore`], which readers can confirm by re-simulation. A [`Leaderboard`] compares confirmed
 //! scores, in one table for each set of rules. docs/arena.md describes the workflow.

@@ -34,7 +34,7 @@ const MAX_CORE_HOURS: f64 = 1e10;
 /// not part of a submission.
 const RECOGNITIONS: [&str; 2] = [GROUND_TRUTH, "learned"];
 
-/// Description of a submission by its authors. A value is valid.
+/// Description of a submission by its authors. Every value has passed validation.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
@@ -57,7 +57,7 @@ pub struct Manifest {
     /// Conditions under which the helper plays.
     #[serde(default)]
     pub play: PlayConditions,
-    /// Costs of the helper.
+    /// Hardware and computing time of the training.
     pub training: Training,
     /// Episodes of the public run.
     pub public: PublicPart,
@@ -125,7 +125,7 @@ impl Default for PlayConditions {
     }
 }
 
-/// Costs of the helper.
+/// Hardware and computing time of the training.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Training {

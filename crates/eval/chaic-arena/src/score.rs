@@ -9,7 +9,7 @@ use chaic_env::trace::MAX_TRACE_BYTES;
 use chaic_env::{Appearance, CHAIC_VERSION, Digest, RunKey};
 use chaic_episodes::Episode;
 use chaic_eval::metrics::{FormulaSet, RunResult, Score};
-use chaic_eval::report::{GrantsFile, Report};
+use chaic_eval::report::{RecordedGrants, Report};
 use chaic_eval::run::{EpisodeJob, RunFolder, RunOptions, planned, read_results};
 use chaic_files::read_below;
 use serde::Serialize;
@@ -36,9 +36,9 @@ pub struct SubmissionScore {
     /// Conditions under which it was played.
     pub conditions: EvaluationConditions,
     /// Grants by helper.
-    pub grants: BTreeMap<String, GrantsFile>,
+    pub grants: BTreeMap<String, RecordedGrants>,
     /// Grants of the partner.
-    pub partner: Option<GrantsFile>,
+    pub partner: Option<RecordedGrants>,
     /// Scores by task and helper.
     pub tasks: BTreeMap<TaskId, BTreeMap<String, Score>>,
     /// Result and digests of each episode run, sorted by key.
@@ -253,8 +253,8 @@ impl SubmissionScore {
                 sha256: submission.sha256().to_owned(),
             },
             conditions: run.conditions(),
-            grants: labels.helpers_file(&run.options.helpers).unwrap_or_default(),
-            partner: labels.partner_file(),
+            grants: labels.helper_grants(&run.options.helpers).unwrap_or_default(),
+            partner: labels.partner_grants(),
             tasks: report.scores().tasks,
             episode_runs: records?,
         })

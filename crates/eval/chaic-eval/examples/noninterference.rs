@@ -18,7 +18,7 @@ use chaic_core::observation::Grants;
 use chaic_env::helper_registry::{BuiltInHelpers, Helper, HelperRegistry as _};
 use chaic_env::rules::RuleSet;
 use chaic_episodes::{Episode, Split, episodes};
-use chaic_eval::audit::{Pair, PartnerMode, ProbeAgent, Secret, compare};
+use chaic_eval::audit::{HiddenProperty, PartnerMode, ProbeAgent, RunPair, compare};
 
 /// First generated seed.
 const FIRST_SEED: u64 = 500_000;
@@ -62,9 +62,9 @@ fn compare_pair(
     let name = OBSERVERS[k % OBSERVERS.len()];
     let (rules_name, rules) =
         [("paper", RuleSet::PAPER), ("compat", RuleSet::COMPAT)][round / 2 % 2];
-    let secret = Secret::ALL[round % 2];
+    let secret = HiddenProperty::ALL[round % 2];
     let (partner, frames, image_size) = (PartnerMode::Acts, FRAMES, IMAGE_SIZE);
-    let pair = Pair { episode: &episode, secret, partner, rules, frames, image_size };
+    let pair = RunPair { episode: &episode, secret, partner, rules, frames, image_size };
     let result = compare(&pair, &|| observer(name, &episode, &rules), None)?;
     let text = |f| format!("{}, {name}, {secret:?}, {rules_name}: {f}", episode.id());
     Ok((result.compared, result.violation.map(text)))

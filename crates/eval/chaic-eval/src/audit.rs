@@ -16,7 +16,7 @@ mod secret;
 
 pub use probe_agent::ProbeAgent;
 pub use recording_agent::Leak;
-pub use secret::Secret;
+pub use secret::HiddenProperty;
 
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -56,11 +56,11 @@ pub enum PartnerMode {
 
 /// Configuration of a pair of runs.
 #[derive(Clone, Copy)]
-pub struct Pair<'a> {
+pub struct RunPair<'a> {
     /// The episode.
     pub episode: &'a Episode,
-    /// Secret that differs between the two runs.
-    pub secret: Secret,
+    /// HiddenProperty that differs between the two runs.
+    pub secret: HiddenProperty,
     /// Behavior of the partner.
     pub partner: PartnerMode,
     /// Rules of both runs.
@@ -101,7 +101,7 @@ pub struct NoninterferenceResult {
 /// # Errors
 /// If the episode can't be played.
 pub fn compare(
-    pair: &Pair<'_>,
+    pair: &RunPair<'_>,
     make: &dyn Fn() -> Helper,
     leak: Option<Leak>,
 ) -> Result<NoninterferenceResult> {
@@ -169,7 +169,7 @@ fn difference(a: &RecordedDecision, b: &RecordedDecision) -> Option<&'static str
 /// obstacles, if the rules announce them, and the behavior of the partner in the image, if it is
 /// granted: its posture may not show a new action yet. The granted state discloses all objects, and
 /// the granted behavior at any place.
-fn is_disclosed(pair: &Pair<'_>, part: &str, a: &Observation, b: &Observation) -> bool {
+fn is_disclosed(pair: &RunPair<'_>, part: &str, a: &Observation, b: &Observation) -> bool {
     let undisclosed = |o: &Observation| {
         let mut granted = o.granted.clone();
         if pair.rules.world.tells_removed {
@@ -238,7 +238,7 @@ struct AuditedRun {
 
 impl AuditedRun {
     fn start(
-        pair: &Pair<'_>,
+        pair: &RunPair<'_>,
         changed: bool,
         make: &dyn Fn() -> Helper,
         leak: Option<Leak>,
@@ -250,7 +250,7 @@ impl AuditedRun {
         }
         let episode = Episode::new(pair.episode.id(), "audit", None, setup)?;
         let log = Arc::new(Mutex::new(Log::with_leak(leak)));
-        let Pair { rules, image_size, .. } = *pair;
+        let RunPair { rules, image_size, .. } = *pair;
         let config = EpisodeConfig {
             rules,
             image_size: Some(image_size),
@@ -289,7 +289,7 @@ impl AuditedRun {
 
 /// Returns the slots of the partner, the watched helper and a rule-based child.
 fn audit_slots(
-    pair: &Pair<'_>,
+    pair: &RunPair<'_>,
     setup: &Setup,
     rules: PlannerRules,
     helper: Helper,

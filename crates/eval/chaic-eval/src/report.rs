@@ -9,7 +9,7 @@ mod write;
 
 pub use coverage::{coverage, untraced_note};
 pub use figure::write_figure;
-pub use labels::{GrantsFile, Labels, title};
+pub use labels::{Labels, RecordedGrants, title};
 pub use tables::{
     additional, counts, diagnostics, intervals, main_result, pairs, resolutions, run_pairs, stuck,
 };

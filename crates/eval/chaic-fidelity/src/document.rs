@@ -9,7 +9,7 @@ use chaic_env::CHAIC_VERSION;
 use chaic_files::{create_folders, read_user_file, write_atomically};
 
 use crate::experiment::Experiment;
-use crate::matrix::PartState;
+use crate::experiment_folder::PartState;
 use crate::sections::{RuleSection, formulas};
 use crate::switches;
 use chaic_eval::figure::{Bar, Bars, FigureError, HelperBars, transport_rate};

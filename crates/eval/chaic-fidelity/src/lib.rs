@@ -8,7 +8,7 @@
 mod compare;
 mod document;
 mod experiment;
-mod matrix;
+mod experiment_folder;
 mod sections;
 mod switches;
 
@@ -19,7 +19,7 @@ pub use document::{
     CAUSES_BEGIN, CAUSES_END, ReportInputs, check_document, document, write_document,
 };
 pub use experiment::{Experiment, ExperimentPart, ExperimentRequest};
-pub use matrix::{Matrix, PartState, parts};
+pub use experiment_folder::{ExperimentFolder, PartState, parts};
 pub use switches::{Change, change};
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use chaic_core::TaskId;
 use chaic_env::RunKey;
 use chaic_env::rules::rule_values;
 
-use crate::matrix::PartState;
+use crate::experiment_folder::PartState;
 use chaic_eval::Result;
 use chaic_eval::metrics::{Interval, PlayedEpisodes, RunResult, differences};
 use chaic_eval::report::{TextTable, interval, title};

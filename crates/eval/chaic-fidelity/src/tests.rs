@@ -288,16 +288,20 @@ fn invalid_plans_are_refused() {
         ),
         (ExperimentRequest::default(), "--episodes"),
     ] {
-        let error = Matrix::create(&out, &request, &BuiltInHelpers).unwrap_err().to_string();
+        let error =
+            ExperimentFolder::create(&out, &request, &BuiltInHelpers).unwrap_err().to_string();
         assert!(error.contains(message), "{message}: {error}");
         assert!(!out.exists(), "{message}: nothing is written");
     }
     assert!(
-        Matrix::resume(&out, &default_request).unwrap_err().to_string().contains("fidelity.json")
+        ExperimentFolder::resume(&out, &default_request)
+            .unwrap_err()
+            .to_string()
+            .contains("fidelity.json")
     );
 
     let two = list(&["planner.walking", "world.blocking"]);
-    let matrix = Matrix::create(
+    let matrix = ExperimentFolder::create(
         &out,
         &ExperimentRequest { switches: two, ..default_request.clone() },
         &BuiltInHelpers,
@@ -313,16 +317,19 @@ fn invalid_plans_are_refused() {
     assert!(given.no_traces && given.rules == Some(RuleSetName::Compat), "{given:?}");
     assert_eq!(given.rule_overrides, [format!("{}=paper", in_order[0])]);
     assert!(matches!(
-        Matrix::create(&out, &default_request, &BuiltInHelpers),
+        ExperimentFolder::create(&out, &default_request, &BuiltInHelpers),
         Err(EvalError::NotEmpty { .. })
     ));
     // No run has started; switches may be added, other options must not change.
     assert!(parts(&matrix).unwrap_err().to_string().contains("has no run yet"));
     let more =
         ExperimentRequest { switches: list(&["world.reach_to"]), ..ExperimentRequest::default() };
-    assert_eq!(Matrix::resume(&out, &more).unwrap().plan.switches.len(), 3);
-    assert_eq!(Matrix::resume(&out, &ExperimentRequest::default()).unwrap().plan.switches.len(), 3);
+    assert_eq!(ExperimentFolder::resume(&out, &more).unwrap().plan.switches.len(), 3);
+    assert_eq!(
+        ExperimentFolder::resume(&out, &ExperimentRequest::default()).unwrap().plan.switches.len(),
+        3
+    );
     let other = ExperimentRequest { seeds: Some(2), ..ExperimentRequest::default() };
-    let error = Matrix::resume(&out, &other).unwrap_err().to_string();
+    let error = ExperimentFolder::resume(&out, &other).unwrap_err().to_string();
     assert!(error.contains("--seeds 5, not 2"), "{error}");
 }

@@ -293,7 +293,7 @@ fn gains(
     differences: &[Difference],
     helpers: &[String],
 ) -> Vec<Gain> {
-    let grants = labels.helpers_file(helpers).unwrap_or_default();
+    let grants = labels.helper_grants(helpers).unwrap_or_default();
     let row = |helper: &String| {
         let gain = gain_of(differences, helper).and_then(|difference| difference.all.as_ref());
         let grants = grants.get(helper).map_or(String::new(), |file| {

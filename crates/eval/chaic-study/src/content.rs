@@ -5,12 +5,12 @@ use serde_json::{Value, json};
 use sha2::{Digest as _, Sha256};
 
 use crate::data;
-use crate::plan::{Plan, SEED, Trial, hex};
+use crate::plan::{SEED, StudyPlan, Trial, hex};
 use crate::study::{PlaySettings, Seat, Simulator};
 
 /// Returns the content of the page of a study. If the simulator runs on the server, neither episodes nor goals
 /// follow from it: the page has no episodes, no names of conditions and no digest of them.
-pub fn page_content(plan: &Plan) -> Value {
+pub fn page_content(plan: &StudyPlan) -> Value {
     let mut content = full_content(plan);
     if plan.study().play.simulator == Simulator::Server {
         // The order of the conditions follows from the digest of the study, so conditions that look equal are one.
@@ -42,7 +42,7 @@ pub fn page_content(plan: &Plan) -> Value {
 }
 
 /// Returns the content of a page that runs the simulator.
-fn full_content(plan: &Plan) -> Value {
+fn full_content(plan: &StudyPlan) -> Value {
     let study = plan.study();
     let forms: serde_json::Map<String, Value> =
         plan.forms().into_iter().map(|(name, form)| (name.to_owned(), json!(form))).collect();
@@ -71,7 +71,7 @@ fn full_content(plan: &Plan) -> Value {
 }
 
 /// Returns the trials of a slot, each as position, condition, episode and helper.
-fn slot_trials(plan: &Plan, slot: u32) -> Value {
+fn slot_trials(plan: &StudyPlan, slot: u32) -> Value {
     let row = |trial: Trial| {
         let is_helper = plan.conditions()[trial.condition].seat == Seat::Helper;
         let helper = if is_helper { chaic_env::helper_registry::NONE } else { plan.helper(trial) };

@@ -14,7 +14,7 @@ use serde_json::json;
 
 use crate::data::{DataRecord, ParticipantData, TrialEnd};
 use crate::error::{Result, StudyError};
-use crate::plan::{PERSON, Plan, Trial};
+use crate::plan::{PERSON, StudyPlan, Trial};
 use crate::record_check::RecordCheck;
 use crate::study::Seat;
 use tables::{Tables, TrialRow};
@@ -57,7 +57,7 @@ pub struct VerifiedTrial {
 /// # Errors
 /// If a file is not that of a participant of this study, two files have the same code, or the folder is not
 /// empty.
-pub fn export(plan: &Plan, paths: &[PathBuf], out: &Path) -> Result<ExportReport> {
+pub fn export(plan: &StudyPlan, paths: &[PathBuf], out: &Path) -> Result<ExportReport> {
     let mut participations = Vec::new();
     for path in files(paths)? {
         let data = ParticipantData::read(&path)?;
@@ -102,7 +102,7 @@ fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
 }
 
 /// Returns the slots without a complete participation, and reports those with several.
-fn open_slots(plan: &Plan, all: &[Participation], problems: &mut Vec<String>) -> Vec<u32> {
+fn open_slots(plan: &StudyPlan, all: &[Participation], problems: &mut Vec<String>) -> Vec<u32> {
     let mut counts: BTreeMap<u32, usize> = BTreeMap::new();
     for participation in all.iter().filter(|p| p.is_complete) {
         *counts.entry(participation.slot).or_default() += 1;
@@ -145,7 +145,7 @@ struct AnsweredForm {
 
 impl Participation {
     /// Checks the records of a participant against the plan.
-    fn new(plan: &Plan, data: ParticipantData, path: &Path) -> Result<Participation> {
+    fn new(plan: &StudyPlan, data: ParticipantData, path: &Path) -> Result<Participation> {
         let wrong = |line: usize, problem: String| data_error(path, line, problem);
         let check = RecordCheck::new(plan, &data.study, data.slot);
         let mut check = check.map_err(|problem| wrong(1, problem))?;
@@ -188,7 +188,7 @@ impl Participation {
     /// Writes the traces and adds the rows of the tables.
     fn export(
         &self,
-        plan: &Plan,
+        plan: &StudyPlan,
         out: &Path,
         tables: &mut Tables,
         report: &mut ExportReport,
@@ -237,7 +237,7 @@ struct CheckedTrace {
 
 /// Compares a trace with the plan and with its re-simulation; returns the first difference.
 fn check_trace(
-    plan: &Plan,
+    plan: &StudyPlan,
     trial: Trial,
     played: &PlayedTrial,
     path: &Path,
@@ -269,7 +269,7 @@ fn check_trace(
 }
 
 /// Returns a problem if the header of a trace is not the one of the trial.
-fn header_problem(plan: &Plan, trial: Trial, trace: &Trace) -> Option<String> {
+fn header_problem(plan: &StudyPlan, trial: Trial, trace: &Trace) -> Option<String> {
     let header = &trace.header;
     let episode = &plan.episodes()[trial.episode];
     let condition = &plan.conditions()[trial.condition];
@@ -291,7 +291,7 @@ fn header_problem(plan: &Plan, trial: Trial, trace: &Trace) -> Option<String> {
 }
 
 /// Returns the description of the data set for `dataset_description.json`.
-fn description(plan: &Plan, variables: &[(String, &'static str)]) -> serde_json::Value {
+fn description(plan: &StudyPlan, variables: &[(String, &'static str)]) -> serde_json::Value {
     let variables: Vec<serde_json::Value> = variables
         .iter()
         .map(

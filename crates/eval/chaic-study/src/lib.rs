@@ -1,6 +1,6 @@
 //! Studies in which people play episodes in a browser.
 //!
-//! **What it is**: a [`Study`] is the content of `study.toml`. A [`Plan`] adds the conditions, the episodes
+//! **What it is**: a [`Study`] is the content of `study.toml`. A [`StudyPlan`] adds the conditions, the episodes
 //! and the digest, and assigns the trials of each slot. [`page_content`] is what the page of the study
 //! needs. [`ParticipantData`] is the file of a participant, whose records [`RecordCheck`] compares with the
 //! plan; [`export`] checks such files and writes data sets, [`deletion`] removes a participant.
@@ -29,7 +29,7 @@ pub use assignment::Assignment;
 pub use content::page_content;
 pub use data::ParticipantData;
 pub use error::{Result, StudyError};
-pub use plan::{Condition, PERSON, Plan, SEED, Trial};
+pub use plan::{Condition, PERSON, SEED, StudyPlan, Trial};
 pub use record_check::RecordCheck;
 pub use simulation::{Balance, simulate};
 pub use slots::{SlotHolder, lowest_free_slot};

@@ -45,7 +45,7 @@ pub struct Condition {
     pub helper: String,
     /// Level of the decisions.
     pub input: Input,
-    /// Indices of the episodes in [`Plan::episodes`].
+    /// Indices of the episodes in [`StudyPlan::episodes`].
     #[serde(skip)]
     pub episodes: Vec<usize>,
 }
@@ -57,13 +57,13 @@ pub struct Trial {
     pub position: u32,
     /// Index of the condition. Practice has the first one, without its helper.
     pub condition: usize,
-    /// Index of the episode in [`Plan::episodes`].
+    /// Index of the episode in [`StudyPlan::episodes`].
     pub episode: usize,
 }
 
 /// A study with its episodes.
 #[derive(Clone, Debug)]
-pub struct Plan {
+pub struct StudyPlan {
     study: Study,
     conditions: Vec<Condition>,
     episodes: Vec<Episode>,
@@ -72,13 +72,13 @@ pub struct Plan {
     assignment: Assignment,
 }
 
-impl Plan {
+impl StudyPlan {
     /// Plans a study.
     ///
     /// # Errors
     /// [`crate::StudyError`] if an episode does not exist, or `path` names too many conditions or too few
     /// episodes.
-    pub fn new(study: Study, path: &std::path::Path) -> Result<Plan> {
+    pub fn new(study: Study, path: &std::path::Path) -> Result<StudyPlan> {
         let wrong =
             |problem: Problem| crate::StudyError::Definition { path: path.to_owned(), problem };
         let mut conditions = conditions(&study);
@@ -108,7 +108,7 @@ impl Plan {
         let digest = digest(&study, &pool.episodes);
         let seed = u64::from_str_radix(&digest[..16], 16).expect("hexadecimal digits");
         let assignment = Assignment::new(study.design, conditions.len(), seed);
-        Ok(Plan { study, conditions, episodes: pool.episodes, practice, digest, assignment })
+        Ok(StudyPlan { study, conditions, episodes: pool.episodes, practice, digest, assignment })
     }
 
     /// Returns the definition of the study.

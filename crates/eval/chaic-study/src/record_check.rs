@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::data::DataRecord;
-use crate::plan::{Plan, Trial, short_digest};
+use crate::plan::{StudyPlan, Trial, short_digest};
 
 /// State of a check after some records. It holds no traces and no ratings.
 #[derive(Clone, Debug)]
@@ -22,7 +22,7 @@ impl RecordCheck {
     ///
     /// # Errors
     /// Returns the problem if the participant is one of another study, or the study has no such slot.
-    pub fn new(plan: &Plan, study: &str, slot: u32) -> Result<RecordCheck, String> {
+    pub fn new(plan: &StudyPlan, study: &str, slot: u32) -> Result<RecordCheck, String> {
         if study != plan.digest() {
             return Err(format!(
                 "the data are of another study: digest {}, expected {}; use the study.toml and the \
@@ -62,7 +62,7 @@ impl RecordCheck {
     ///
     /// # Errors
     /// Returns the problem of the record.
-    pub fn add(&mut self, plan: &Plan, record: &DataRecord) -> Result<(), String> {
+    pub fn add(&mut self, plan: &StudyPlan, record: &DataRecord) -> Result<(), String> {
         match record {
             DataRecord::Start { .. } => return Err("a second `start`".to_owned()),
             DataRecord::Instructed {} | DataRecord::Complete {} => {}
@@ -95,7 +95,7 @@ impl RecordCheck {
 
     fn check_answers(
         &self,
-        plan: &Plan,
+        plan: &StudyPlan,
         position: u32,
         name: &str,
         ratings: &BTreeMap<String, Option<i32>>,

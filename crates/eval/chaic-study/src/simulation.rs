@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use chaic_core::rng::RngStream;
 
-use crate::plan::Plan;
+use crate::plan::StudyPlan;
 use crate::slots::{SlotHolder, lowest_free_slot};
 
 /// Longest time between the arrivals of two participants, seconds.
@@ -53,7 +53,7 @@ struct Participant {
 
 /// Simulates participants who arrive one after the other, each with this probability of dropping out
 /// without notice. The slots of drop-outs are free after the study's time-out.
-pub fn simulate(plan: &Plan, n_participants: u32, dropout: f64) -> Balance {
+pub fn simulate(plan: &StudyPlan, n_participants: u32, dropout: f64) -> Balance {
     let timeout_secs = u64::from(plan.study().timeout_minutes) * 60;
     let length_secs = (plan.length_minutes() * SECS_PER_MINUTE) as f32;
     let (mut now_secs, mut late) = (0, 0);
@@ -92,7 +92,7 @@ fn leave(participants: &mut [Participant], now_secs: u64) -> u32 {
     late
 }
 
-fn balance(plan: &Plan, arrived: u32, done: &BTreeSet<u32>, late: u32) -> Balance {
+fn balance(plan: &StudyPlan, arrived: u32, done: &BTreeSet<u32>, late: u32) -> Balance {
     let assignment = plan.assignment();
     let n_positions = assignment.orders()[0].len();
     let mut counts = vec![vec![0; plan.conditions().len()]; n_positions];

@@ -39,11 +39,11 @@ fn folder_with(definition: &str) -> (tempfile::TempDir, PathBuf) {
     (dir, path)
 }
 
-fn plan_of(path: &Path) -> Result<Plan> {
-    Plan::new(Study::read(path)?, path)
+fn plan_of(path: &Path) -> Result<StudyPlan> {
+    StudyPlan::new(Study::read(path)?, path)
 }
 
-fn plan(definition: &str) -> Plan {
+fn plan(definition: &str) -> StudyPlan {
     let (_dir, path) = folder_with(definition);
     plan_of(&path).expect("a valid study")
 }

@@ -21,7 +21,7 @@ const EXPANSION: usize = 2;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Blocks {
-    /// Depthwise 5x5 convolution and an inverted bottleneck (Liu et al. 2022). The shipped detector
+    /// Depthwise 5x5 convolution and an inverted bottleneck (Liu et al. 2022). The bundled detector
     /// uses it.
     #[default]
     Depthwise,
@@ -61,7 +61,7 @@ impl Default for Detector {
 }
 
 impl Detector {
-    /// Creates the network that is trained and shipped.
+    /// Creates the network that is trained and bundled.
     pub fn new() -> Detector {
         Detector::with_blocks(Blocks::Depthwise)
     }

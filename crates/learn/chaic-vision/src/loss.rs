@@ -33,7 +33,7 @@ pub struct LossConfig {
 }
 
 impl LossConfig {
-    /// Values of the shipped detector.
+    /// Values of the bundled detector.
     pub const TRAINING: LossConfig = LossConfig {
         reference_area_px: 8000.0,
         area_exponent: 0.75,

@@ -50,7 +50,7 @@ impl DetectorNoiseModel {
         }
     }
 
-    /// Returns the rates of the shipped detector (crates/learn/chaic-vision/weights).
+    /// Returns the rates of the bundled detector (crates/learn/chaic-vision/weights).
     pub fn built_in() -> DetectorNoiseModel {
         let text = include_bytes!("../weights/faults.json");
         serde_json::from_slice(text).expect("a test reads it")

@@ -18,7 +18,7 @@ use crate::trained::TrainedDetector;
 
 /// Name of the learned models; `learned:FILE` reads other weights.
 pub const LEARNED: &str = "learned";
-/// Name of ground truth with the error rates of the shipped detector; `noisy:FILE` reads other
+/// Name of ground truth with the error rates of the bundled detector; `noisy:FILE` reads other
 /// rates.
 pub const NOISY: &str = "noisy";
 

@@ -41,7 +41,7 @@ impl Default for RoiNetwork {
 }
 
 impl RoiNetwork {
-    /// Creates the network that is trained and shipped.
+    /// Creates the network that is trained and bundled.
     pub fn new() -> RoiNetwork {
         let mut net = Network::default();
         let crop = net.input(N_CHANNELS);

@@ -124,7 +124,7 @@ fn tiny() -> DetectorTrainingConfig {
         crops: [crops(1, 96), crops(2, 64)],
         warm_up: 2,
         learning_rate: 5e-3,
-        ..DetectorTrainingConfig::shipped(400)
+        ..DetectorTrainingConfig::bundled(400)
     }
 }
 
@@ -256,7 +256,7 @@ fn invalid_images_give_no_detections() {
 }
 
 #[test]
-fn the_shipped_detector_finds_most_objects() {
+fn the_bundled_detector_finds_most_objects() {
     let trained = TrainedDetector::built_in();
     let (split, config) = (DatasetSplit::Validation, ViewConfig::NATURAL);
     let (found, _) = report(&trained, split, config, 8, 2, |_, _, _| ());
@@ -276,7 +276,7 @@ fn training_learns() {
     assert!(last < 0.8 * first, "{first} to {last}");
 }
 
-/// Training of the second stage on the shipped first stage.
+/// Training of the second stage on the bundled first stage.
 fn second_stage_learner(steps: u64) -> DetectorLearner {
     let second_stage = RoiTrainingConfig {
         steps,
@@ -286,7 +286,7 @@ fn second_stage_learner(steps: u64) -> DetectorLearner {
         proposals_per_view: 12,
     };
     let config =
-        DetectorTrainingConfig { steps: 0, second_stage, ..DetectorTrainingConfig::shipped(0) };
+        DetectorTrainingConfig { steps: 0, second_stage, ..DetectorTrainingConfig::bundled(0) };
     let mut learner = DetectorLearner::new(config);
     let first_stage = TrainedDetector { second_stage: None, ..TrainedDetector::built_in() };
     let weights = first_stage.to_bytes().unwrap();

@@ -81,13 +81,13 @@ pub struct DetectorTrainingConfig {
 
 impl Default for DetectorTrainingConfig {
     fn default() -> DetectorTrainingConfig {
-        DetectorTrainingConfig::shipped(30_000)
+        DetectorTrainingConfig::bundled(30_000)
     }
 }
 
 impl DetectorTrainingConfig {
-    /// Returns the configuration of the shipped detector with this number of steps.
-    pub fn shipped(steps: u64) -> DetectorTrainingConfig {
+    /// Returns the configuration of the bundled detector with this number of steps.
+    pub fn bundled(steps: u64) -> DetectorTrainingConfig {
         DetectorTrainingConfig {
             seed: 1,
             steps,

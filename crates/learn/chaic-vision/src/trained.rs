@@ -72,11 +72,11 @@ impl TrainedDetector {
         }
     }
 
-    /// Returns the detector that chaic ships; weights/README.md documents its training and
+    /// Returns the detector that is part of chaic; weights/README.md documents its training and
     /// accuracy.
     pub fn built_in() -> TrainedDetector {
         let bytes = include_bytes!("../weights/detector.safetensors");
-        TrainedDetector::from_bytes(bytes).expect("a test reads the shipped weights")
+        TrainedDetector::from_bytes(bytes).expect("a test reads the bundled weights")
     }
 
     /// Reads a safetensors file of a detector with one or two stages.

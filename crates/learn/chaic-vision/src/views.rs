@@ -62,7 +62,7 @@ pub struct ViewConfig {
 }
 
 impl ViewConfig {
-    /// Distribution of the shipped detector's training.
+    /// Distribution of the bundled detector's training.
     pub const TRAINING: ViewConfig = ViewConfig {
         size_px: 512,
         swap_fraction: 0.7,

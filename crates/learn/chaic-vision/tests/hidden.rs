@@ -10,7 +10,7 @@ use chaic_core::observation::Grants;
 use chaic_env::helper_registry::built_in;
 use chaic_env::rules::RuleSet;
 use chaic_episodes::find_episode;
-use chaic_eval::audit::{Pair, PartnerMode, Secret, compare};
+use chaic_eval::audit::{HiddenProperty, PartnerMode, RunPair, compare};
 use chaic_vision::behavior::network::{BehaviorNetwork, TrainedBehavior};
 use chaic_vision::behavior::recognize::LearnedBehaviorFactory;
 use chaic_vision::perception::LearnedPerceptionFactory;
@@ -39,9 +39,9 @@ fn learned_perception_reveals_nothing_hidden() {
         let episode = find_episode(&format!("{task}/gen/502")).unwrap();
         let name = ["rhp", "random", "follow"][k % 3];
         assert!(!helper(name).grants.ids, "{name} has the grant of ids");
-        let pair = Pair {
+        let pair = RunPair {
             episode: &episode,
-            secret: Secret::ALL[k % 2],
+            secret: HiddenProperty::ALL[k % 2],
             partner: [PartnerMode::Acts, PartnerMode::Waits][k % 2],
             rules: RuleSet::PAPER,
             frames: 600,

@@ -80,7 +80,7 @@ impl World {
                 } else {
                     Some(hand)
                 };
-                let mut steps = vec![ActionStep::new(Phase::JudgeTake { hand, object }, 0)];
+                let mut steps = vec![ActionStep::new(Phase::DecidePickUp { hand, object }, 0)];
                 if is_heavy {
                     steps.push(ActionStep::new(Phase::AwaitPartner { object, absent: 0 }, 0));
                 }
@@ -96,7 +96,7 @@ impl World {
                 if self.object(obstacle).0.class.info().role != Role::Obstacle {
                     return Err(FailureReason::Impossible);
                 }
-                let judge = Phase::JudgeTake { hand: Some(hand), object: obstacle };
+                let judge = Phase::DecidePickUp { hand: Some(hand), object: obstacle };
                 let mut steps = vec![ActionStep::new(judge, 0)];
                 self.push_approach(agent, obstacle, &mut steps);
                 Ok(steps)
@@ -111,7 +111,7 @@ impl World {
                 let uses_both = self.holds_furniture(agent).is_some();
                 let hand =
                     if uses_both || self.vehicle(agent).is_some() { None } else { Some(hand) };
-                let mut steps = vec![ActionStep::new(Phase::JudgePut { hand, place }, 0)];
+                let mut steps = vec![ActionStep::new(Phase::DecidePutOn { hand, place }, 0)];
                 self.push_approach(agent, place, &mut steps);
                 Ok(steps)
             }

@@ -29,7 +29,7 @@ impl World {
     /// the spots that cut off no relevant floor for any agent, it is the one farthest from every
     /// opening. If there is none, it is the spot that cuts off the fewest cells, which may be the
     /// initial position of the obstacle.
-    pub(crate) fn spot_aside(&self, agent: AgentId, obstacle: EntityId) -> Vec3 {
+    pub(crate) fn set_down_spot(&self, agent: AgentId, obstacle: EntityId) -> Vec3 {
         let pose = self.person(agent).pose;
         let size = self.object(obstacle).0.size_m();
         let radius = 0.5 * math::hypot(size.x, size.z);

@@ -10,7 +10,8 @@
 //! **Invariants**
 //! - The next state depends on the setup, the rules, the state and the submitted actions only.
 //! - [`State`] is complete: a world restored from a snapshot continues bit-identically.
-//! - All other fields of a [`World`] are derived from the setup and never change.
+//! - Besides the state, only the list of pending events changes. The other fields are the setup, the rules
+//!   and values derived from them.
 
 mod setup;
 mod state;

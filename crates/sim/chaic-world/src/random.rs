@@ -42,16 +42,16 @@ impl World {
     /// Returns the stream of an agent's next draw for this purpose, and counts the draw.
     pub(crate) fn rng(&mut self, agent: AgentId, purpose: RngPurpose) -> RngStream {
         let seed = self.setup.seed;
-        let State { agents, conditions, .. } = &mut self.state;
+        let State { agents, impairment_states, .. } = &mut self.state;
         let draws = &mut agents[agent.index()].draws;
         let count = match purpose {
             RngPurpose::Break => &mut draws.breaks,
             RngPurpose::Take => &mut draws.takes,
             RngPurpose::PutOn => &mut draws.puts_on,
             RngPurpose::WatchPutIn => &mut draws.puts_in,
-            // Requested only for agents with a tremor, who have a condition.
-            RngPurpose::Slip => &mut conditions[agent.index()].slips,
-            RngPurpose::Drop => &mut conditions[agent.index()].drops,
+            // Requested only for agents with a tremor, who have such a state.
+            RngPurpose::Slip => &mut impairment_states[agent.index()].slips,
+            RngPurpose::Drop => &mut impairment_states[agent.index()].drops,
         };
         let index = u64::from(agent.0) << 32 | u64::from(*count);
         *count += 1;

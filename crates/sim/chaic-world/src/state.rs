@@ -28,12 +28,12 @@ pub struct State {
     /// append it after the other fields, so worlds without such agents keep their previous
     /// encoding.
     #[serde(skip)]
-    pub conditions: Vec<Condition>,
+    pub impairment_states: Vec<ImpairmentState>,
 }
 
 /// State of an agent that tires or has a tremor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Condition {
+pub struct ImpairmentState {
     /// Fatigue: 0 rested, 1 exhausted.
     pub fatigue: f32,
     /// Number of draws that decided whether a grasp slips.
@@ -253,21 +253,21 @@ pub enum Phase {
     /// Follows in a joint carry until the leader releases the furniture.
     CarryAlong,
     /// Takes no time: decides whether the pick-up is possible and succeeds.
-    JudgeTake {
+    DecidePickUp {
         /// The hand; `None` for both.
         hand: Option<Hand>,
         /// The object.
         object: EntityId,
     },
     /// Takes no time: decides whether the put-on is possible and succeeds.
-    JudgePut {
+    DecidePutOn {
         /// The hand; `None` for the contents of a rider's basket or for furniture in both hands.
         hand: Option<Hand>,
         /// The place.
         place: EntityId,
     },
     /// Takes no time: chooses a spot for a removed obstacle.
-    JudgeAside {
+    ChooseSetDownSpot {
         /// The hand that holds it.
         hand: Hand,
         /// The obstacle.

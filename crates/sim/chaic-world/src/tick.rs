@@ -130,10 +130,12 @@ impl World {
                 status
             }
             Phase::AwaitPartner { .. } => self.await_partner(agent, activity),
-            Phase::JudgeTake { hand, object } => self.judge_take(agent, activity, hand, object),
-            Phase::JudgePut { hand, place } => self.judge_put(agent, activity, hand, place),
-            Phase::JudgeAside { hand, obstacle } => {
-                self.judge_aside(agent, activity, hand, obstacle)
+            Phase::DecidePickUp { hand, object } => {
+                self.decide_pick_up(agent, activity, hand, object)
+            }
+            Phase::DecidePutOn { hand, place } => self.decide_put_on(agent, activity, hand, place),
+            Phase::ChooseSetDownSpot { hand, obstacle } => {
+                self.choose_set_down_spot(agent, activity, hand, obstacle)
             }
             Phase::Grasp { hand, object } => match status {
                 StepProgress::Done => self.grasp(agent, activity, hand, object),
@@ -284,7 +286,7 @@ impl World {
 
     fn update_fatigue(&mut self, agent: AgentId, is_working: bool) {
         if let Some(endurance) = self.capability(agent).endurance {
-            let condition = &mut self.state.conditions[agent.index()];
+            let condition = &mut self.state.impairment_states[agent.index()];
             condition.fatigue = endurance.after_frame(condition.fatigue, is_working);
         }
     }

@@ -14,7 +14,7 @@ use crate::event::{Event, EventKind};
 use crate::rules::{ReachTo, Rules};
 use crate::setup::{AgentSpec, ObjectSpec, Setup, SetupError};
 use crate::shape::{Block, blocks_at, wall_blocks};
-use crate::state::{AgentState, Condition, ObjectLocation, ObjectState, State};
+use crate::state::{AgentState, ImpairmentState, ObjectLocation, ObjectState, State};
 
 /// An episode in progress.
 #[derive(Clone, Debug)]
@@ -166,8 +166,8 @@ impl World {
     /// Returns the state as bytes.
     pub fn snapshot(&self) -> Snapshot {
         let mut bytes = postcard::to_stdvec(&self.state).expect("a state is plain data");
-        if !self.state.conditions.is_empty() {
-            bytes = postcard::to_extend(&self.state.conditions, bytes)
+        if !self.state.impairment_states.is_empty() {
+            bytes = postcard::to_extend(&self.state.impairment_states, bytes)
                 .expect("conditions are plain data");
         }
         Snapshot(bytes)
@@ -182,11 +182,11 @@ impl World {
         let (mut state, rest): (State, _) =
             postcard::take_from_bytes(&snapshot.0).map_err(unreadable)?;
         if !rest.is_empty() {
-            state.conditions = postcard::from_bytes(rest).map_err(unreadable)?;
+            state.impairment_states = postcard::from_bytes(rest).map_err(unreadable)?;
         }
         let count = |state: &State| {
             let (objects, people) = (state.objects.len(), state.agents.len());
-            let conditions = match state.conditions.len() {
+            let conditions = match state.impairment_states.len() {
                 0 => String::new(),
                 n => format!(" with {n} conditions"),
             };
@@ -226,7 +226,7 @@ impl World {
 
     /// Returns the fatigue of an agent: 0 rested, 1 exhausted.
     pub fn fatigue(&self, agent: AgentId) -> f32 {
-        self.state.conditions.get(agent.index()).map_or(0.0, |c| c.fatigue)
+        self.state.impairment_states.get(agent.index()).map_or(0.0, |c| c.fatigue)
     }
 
     /// Returns the specification and the state of an existing object.
@@ -408,15 +408,15 @@ fn initial_state(setup: &Setup) -> State {
         child_is_away: false,
         stuck_frames: 0,
         over: false,
-        conditions: initial_conditions(setup),
+        impairment_states: initial_impairment_states(setup),
     }
 }
 
-fn initial_conditions(setup: &Setup) -> Vec<Condition> {
+fn initial_impairment_states(setup: &Setup) -> Vec<ImpairmentState> {
     let has_condition =
         |p: &AgentSpec| p.capability().endurance.is_some() || p.capability().tremor.is_some();
     let n = if setup.people.iter().any(has_condition) { setup.people.len() } else { 0 };
-    vec![Condition::default(); n]
+    vec![ImpairmentState::default(); n]
 }
 
 /// Returns the support of an object at the start: the object whose top is at the height of its

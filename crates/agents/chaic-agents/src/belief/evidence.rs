@@ -310,7 +310,7 @@ impl Evidence {
         };
         self.delivered.clear();
         let known = memory.delivered.iter().filter_map(|t| Some((*t, memory.class_of(*t)?)));
-        let gone = memory.objects.iter().filter(|o| o.is_gone && !has_broken(o.track));
+        let gone = memory.objects.iter().filter(|o| o.is_out_of_play && !has_broken(o.track));
         let gone: Vec<_> = gone.map(|o| (o.track, o.class)).collect();
         let known: Vec<_> = known.collect();
         for (track, class) in &known {
@@ -328,7 +328,7 @@ impl Evidence {
         if memory.frame < FIRST_TAKE_FRAME {
             return;
         }
-        for object in memory.objects.iter().filter(|o| !o.is_present && !o.is_gone) {
+        for object in memory.objects.iter().filter(|o| !o.is_present && !o.is_out_of_play) {
             self.record_take(briefing, (object.track, object.class), VANISHED, memory.frame);
         }
     }

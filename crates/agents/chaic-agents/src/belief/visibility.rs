@@ -11,7 +11,7 @@ const OWN_FOOTPRINT_M: f32 = 0.6;
 
 /// Returns whether an object is believed to lie in play, outside of all hands.
 pub(super) fn is_at_rest(object: &MappedObject, now: Frame) -> bool {
-    object.is_present && !object.is_gone && object.held_until <= now
+    object.is_present && !object.is_out_of_play && object.held_until <= now
 }
 
 /// Returns whether a wall stands between a person and an object.

@@ -89,7 +89,7 @@ pub fn apply_outcome(
         }
         (Action::RemoveObstacle { obstacle, .. }, Outcome::Success) => {
             // It was moved elsewhere and is no longer relevant.
-            memory.objects.mark_gone(obstacle);
+            memory.objects.mark_out_of_play(obstacle);
             memory.objects.mark_absent(obstacle);
         }
         (Action::PickUp { object, .. }, Outcome::Failure(reason))
@@ -135,7 +135,7 @@ fn apply_failure(memory: &mut Memory, object: TrackId, reason: FailureReason) {
                 memory.objects.ignore(object, now + rules.ignore_frames);
             }
         }
-        FailureReason::Broke | FailureReason::OutOfPlay => memory.objects.mark_gone(object),
+        FailureReason::Broke | FailureReason::OutOfPlay => memory.objects.mark_out_of_play(object),
         FailureReason::HeldByOther => {
             memory.objects.mark_held(object, now + memory.rules.held_frames);
             // Regardless of its appearance: the failed attempt is certain evidence.

@@ -61,7 +61,7 @@ pub struct MappedObject {
     /// True if it is assumed to be at its last position.
     pub is_present: bool,
     /// True if it is out of play: delivered, lost or broken.
-    pub is_gone: bool,
+    pub is_out_of_play: bool,
     /// Observations of its position that did not show it.
     misses: u32,
     /// Number of misses after which it is forgotten.
@@ -90,7 +90,7 @@ impl Placement {
             bottom_m: object.bottom_m,
             top_m: object.top_m,
             is_lying,
-            is_available: is_lying && !object.is_gone,
+            is_available: is_lying && !object.is_out_of_play,
         }
     }
 
@@ -116,7 +116,7 @@ impl MappedObject {
             held_until: 0,
             failures: 0,
             is_present: true,
-            is_gone: false,
+            is_out_of_play: false,
             misses: 0,
             misses_to_forget: MISSES,
             placement: None,
@@ -138,7 +138,7 @@ impl MappedObject {
             held_until: 0,
             failures: 0,
             is_present: true,
-            is_gone: false,
+            is_out_of_play: false,
             misses: 0,
             misses_to_forget: MISSES,
             placement: None,
@@ -165,7 +165,10 @@ impl MappedObject {
 
     /// Returns whether it may be approached now: present, in play, not held, and not ignored.
     pub fn is_available(&self, now: Frame) -> bool {
-        self.is_present && !self.is_gone && now >= self.ignore_until && now >= self.held_until
+        self.is_present
+            && !self.is_out_of_play
+            && now >= self.ignore_until
+            && now >= self.held_until
     }
 
     fn is_fixed(&self) -> bool {
@@ -315,7 +318,7 @@ impl SemanticMap {
         }
         object.is_present = state.holder.is_some() || state.container.is_none();
         object.held_until = if state.holder.is_some() { now + PLACED_HELD_FRAMES } else { 0 };
-        object.is_gone |= state.is_gone;
+        object.is_out_of_play |= state.is_out_of_play;
         object.misses = 0;
         let was_lying = from.is_some_and(|from| from.is_lying) && was_present;
         let was_available = from.is_some_and(|from| from.is_available) && was_present;
@@ -328,8 +331,9 @@ impl SemanticMap {
         }
     }
 
-    /// Counts objects that become available again as changes.
-    pub fn expire(&mut self, before: Frame, now: Frame) {
+    /// Increases the change count for each object whose `ignore_until` or `held_until` has passed since `before`,
+    /// and resets its failures.
+    pub fn count_newly_available(&mut self, before: Frame, now: Frame) {
         let passed = |until: Frame| before < until && until <= now;
         for object in self.objects.values_mut() {
             // A granted state includes the release of an object.
@@ -424,15 +428,15 @@ impl SemanticMap {
     /// Marks an object as in play again.
     pub fn return_to_play(&mut self, track: TrackId) {
         if let Some(object) = self.objects.get_mut(&track) {
-            object.is_gone = false;
+            object.is_out_of_play = false;
             self.n_changes += 1;
         }
     }
 
     /// Marks an object as out of play.
-    pub fn mark_gone(&mut self, track: TrackId) {
+    pub fn mark_out_of_play(&mut self, track: TrackId) {
         if let Some(object) = self.objects.get_mut(&track) {
-            object.is_gone = true;
+            object.is_out_of_play = true;
         }
     }
 }
@@ -582,7 +586,7 @@ mod tests {
         map.ignore(apple, 500);
         assert!(!map.get(apple).expect("seen").is_available(499));
         let n_changes = map.change_count();
-        map.expire(400, 500);
+        map.count_newly_available(400, 500);
         assert!(map.get(apple).expect("seen").is_available(500) && map.change_count() > n_changes);
     }
 

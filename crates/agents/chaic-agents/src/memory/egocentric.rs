@@ -99,7 +99,7 @@ fn channel_of(object: &MappedObject, briefing: &Briefing) -> Option<usize> {
     if briefing.goal_places.contains(&class) {
         return Some(GOAL_PLACE);
     }
-    if object.is_gone {
+    if object.is_out_of_play {
         return None;
     }
     if briefing.possible_targets.contains(&class) {

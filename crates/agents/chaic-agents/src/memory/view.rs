@@ -12,7 +12,8 @@ impl Memory {
     /// have no position, so they are not contained.
     pub fn view(&self, path: &[usize]) -> MemoryView {
         let grid = self.map.grid();
-        let objects = self.objects.iter().filter(|object| object.is_present && !object.is_gone);
+        let objects =
+            self.objects.iter().filter(|object| object.is_present && !object.is_out_of_play);
         MemoryView {
             map: ExploredMap {
                 min: grid.center(0) - 0.5 * CELL_M,

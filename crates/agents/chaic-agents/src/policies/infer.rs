@@ -21,24 +21,24 @@ use crate::decision::{Context, HandState, Plan, Policy, Subject};
 use crate::memory::Memory;
 use crate::rules::RuleProfile;
 use crate::team::builder::{PartnerModel, ProblemBuilder};
-use crate::team::{Operation, SearchSettings, TeamProblem, improve, simulate};
+use crate::team::{Operation, SearchSettings, TeamProblem, search_operations, simulate};
 use crate::track::TrackId;
 
 /// Parts of the helper that an ablation switches off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InferOptions {
     /// True if it follows the partner while the goal is unclear.
-    pub watches: bool,
+    pub follows_partner: bool,
     /// True if it infers the partner's limits; else it assumes an adult without limits.
     pub infers_constraint: bool,
     /// True if it plans for both; else it follows the rules of the oracle once the goal is clear.
-    pub plans: bool,
+    pub uses_team_planner: bool,
 }
 
 impl InferOptions {
     /// Everything on.
     pub const ALL: InferOptions =
-        InferOptions { watches: true, infers_constraint: true, plans: true };
+        InferOptions { follows_partner: true, infers_constraint: true, uses_team_planner: true };
 }
 
 /// Constants of the policy, all ours; chosen on episodes of `gen-standard:7000..7010`.
@@ -46,16 +46,16 @@ mod constants {
     use chaic_core::Frame;
 
     /// Probability of the most likely target set from which the helper acts on it.
-    pub const SURE: f32 = 0.7;
+    pub const IDENTIFIED_PROBABILITY: f32 = 0.7;
     /// Time after a sighting for which the helper follows the partner while the goal is unclear,
     /// frames. Later it explores, which finds the partner sooner.
     pub const LOST_FRAMES: Frame = 200;
     /// Goals with a lower probability are left out of the plan.
     pub const MIN_GOAL_PROBABILITY: f32 = 0.04;
     /// Probability from which a class outside the target set counts as wanted.
-    pub const MIN_EXTRA: f32 = 0.5;
+    pub const MIN_EXTRA_PROBABILITY: f32 = 0.5;
     /// Number of objects assumed for each class of a target set: more than any episode has.
-    pub const ALL_OF_CLASS: f32 = 9.0;
+    pub const ASSUMED_OBJECTS_PER_CLASS: f32 = 9.0;
     /// Value by which a new plan must exceed the current one before a walk to an object is given
     /// up, deliveries.
     pub const SWITCH_GAIN: f32 = 0.25;
@@ -146,9 +146,9 @@ impl InferPolicy {
             let wanted = briefing.possible_targets.iter().filter_map(|class| {
                 let info = class.info();
                 if info.sets.contains(&set) {
-                    return Some((*class, ALL_OF_CLASS));
+                    return Some((*class, ASSUMED_OBJECTS_PER_CLASS));
                 }
-                let is_likely = belief.goal.probability_wanted(*class) >= MIN_EXTRA;
+                let is_likely = belief.goal.probability_wanted(*class) >= MIN_EXTRA_PROBABILITY;
                 let n = if info.role == Role::Fragile { 2.0 } else { 1.0 };
                 is_likely.then_some((*class, n))
             });
@@ -162,7 +162,10 @@ impl InferPolicy {
     /// Returns whether the goal is clear enough to act on it, and notes when it became so.
     fn check_goal(&mut self, context: &Context<'_>) -> bool {
         let is_clear = context.briefing.goal.is_some()
-            || self.belief.as_ref().is_some_and(|belief| belief.goal.most_likely().1 >= SURE);
+            || self
+                .belief
+                .as_ref()
+                .is_some_and(|belief| belief.goal.most_likely().1 >= IDENTIFIED_PROBABILITY);
         if is_clear && self.identified.is_none() {
             self.identified = Some(context.memory.frame);
         }
@@ -185,7 +188,8 @@ impl InferPolicy {
         let partner = self.partner_model(context);
         let problem = self.builder.build(context.briefing, context.memory, &partner)?;
         let warm = self.operations(&problem);
-        let plan = improve(&problem, warm.as_slice(), SearchSettings::DEFAULT, &mut self.rng);
+        let plan =
+            search_operations(&problem, warm.as_slice(), SearchSettings::DEFAULT, &mut self.rng);
         let stay = warm.map_or(f32::MIN, |warm| simulate(&problem, &warm));
         self.may_switch = plan.value > stay + SWITCH_GAIN;
         self.partner_plan = description::expected_partner_plan(&problem, &plan.operations);
@@ -284,8 +288,8 @@ impl InferPolicy {
         }
         let partner = memory.companion(context.briefing, CompanionRole::Partner);
         let was_seen = partner.is_some_and(|p| p.frame + LOST_FRAMES > memory.frame);
-        let watches = self.options.watches && was_seen;
-        if watches && valid.contains(&Plan::FollowPartner) {
+        let follows = self.options.follows_partner && was_seen;
+        if follows && valid.contains(&Plan::FollowPartner) {
             return Plan::FollowPartner;
         }
         Plan::Explore
@@ -351,7 +355,7 @@ impl Policy for InferPolicy {
             self.mode = "watch";
             return Ok(self.while_unclear(context, valid));
         }
-        if !self.options.plans {
+        if !self.options.uses_team_planner {
             self.mode = "rules";
             let goal = self.most_likely_goal(context.briefing);
             let briefing = Briefing { goal, ..context.briefing.clone() };

@@ -225,7 +225,7 @@ impl PendingStep {
         }
         let plan = valid.iter().find(|plan| plan.subject().is_some_and(|s| s.track == track));
         let object = memory.objects.get(track);
-        let is_lost = object.is_some_and(|o| o.is_gone || memory.frame < o.held_until);
+        let is_lost = object.is_some_and(|o| o.is_out_of_play || memory.frame < o.held_until);
         if self.is_late(context) || is_lost || n_failed >= self.n_left {
             return StepChoice::Skip;
         }

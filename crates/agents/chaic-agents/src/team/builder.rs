@@ -152,7 +152,7 @@ impl ProblemBuilder {
         let found: Vec<(PlaceKind, &MappedObject)> = memory
             .objects
             .iter()
-            .filter(|o| o.is_present && !o.is_gone)
+            .filter(|o| o.is_present && !o.is_out_of_play)
             .filter_map(|o| Some((kind(o)?, o)))
             .collect();
         self.start_epoch(memory, &found);

@@ -32,9 +32,9 @@ pub struct TeamPlan {
     pub value: f32,
 }
 
-/// Returns the best sequence found. The search starts from the best of `candidates` and a greedy
-/// sequence, so the result is never worse than any of them.
-pub fn improve(
+/// Returns the best sequence found. The search starts from the best of the empty sequence, four greedy
+/// sequences and `candidates`, so the result is never worse than any of them.
+pub fn search_operations(
     problem: &TeamProblem,
     candidates: &[Vec<Operation>],
     settings: SearchSettings,

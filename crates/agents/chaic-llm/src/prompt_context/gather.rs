@@ -316,7 +316,7 @@ fn map(context: &Context<'_>, length: Length) -> Map {
     let mut objects: Vec<(f32, &MappedObject)> = memory
         .objects
         .iter()
-        .filter(|t| t.is_present && !t.is_gone && kind(t.class).is_some())
+        .filter(|t| t.is_present && !t.is_out_of_play && kind(t.class).is_some())
         .map(|t| (memory.path_length_to(t).unwrap_or_else(|| 2.0 * t.distance_from(here)), t))
         .collect();
     objects.sort_by(|a, b| a.0.total_cmp(&b.0));

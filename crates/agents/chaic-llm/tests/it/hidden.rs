@@ -8,7 +8,7 @@ use chaic_env::RunKey;
 use chaic_env::helper_registry::HelperRegistry as _;
 use chaic_env::rules::RuleSet;
 use chaic_episodes::find_episode;
-use chaic_eval::audit::{Pair, PartnerMode, Secret, compare};
+use chaic_eval::audit::{HiddenProperty, PartnerMode, RunPair, compare};
 use chaic_llm::LanguageHelpers;
 use chaic_llm_standin::Options;
 
@@ -23,8 +23,10 @@ fn language_helpers_learn_neither_goal_nor_constraint() {
     let rules = RuleSet::PAPER;
     // Each agent has its own record.
     let seed = AtomicU32::new(0);
-    let cases =
-        [("llm", TaskId::HighTarget, Secret::Goal), ("vlm", TaskId::Shopping, Secret::Constraint)];
+    let cases = [
+        ("llm", TaskId::HighTarget, HiddenProperty::Goal),
+        ("vlm", TaskId::Shopping, HiddenProperty::Constraint),
+    ];
     for (helper, task, secret) in cases {
         let episode = find_episode(&format!("{task}/test/01")).unwrap();
         let make = || {
@@ -34,7 +36,7 @@ fn language_helpers_learn_neither_goal_nor_constraint() {
         };
         for partner in [PartnerMode::Acts, PartnerMode::Waits] {
             let (episode, frames) = (&episode, 400);
-            let pair = Pair { episode, secret, partner, rules, frames, image_size: SIZE };
+            let pair = RunPair { episode, secret, partner, rules, frames, image_size: SIZE };
             let result = compare(&pair, &make, None).unwrap();
             assert_eq!(result.violation, None, "{helper}, {task}");
             assert!(result.compared > 0);

@@ -14,7 +14,7 @@ use chaic_core::observation::{Grants, SensorConfig};
 use chaic_core::{Action, Agent, AgentError, Briefing, Observation};
 use chaic_env::helper_registry::{BuiltInHelpers, Helper, HelperRegistry};
 use chaic_study::data::CODE_ALPHABET;
-use chaic_study::{Plan, Study};
+use chaic_study::{Study, StudyPlan};
 use chaic_study_server::{Counts, ServerError, ServerOptions, StudyServer};
 use serde_json::{Value, json};
 
@@ -108,9 +108,9 @@ impl Folder {
         Folder { dir }
     }
 
-    pub fn plan(&self) -> Plan {
+    pub fn plan(&self) -> StudyPlan {
         let path = self.dir.path().join("study.toml");
-        Plan::new(Study::read(&path).expect("a study"), &path).expect("a plan")
+        StudyPlan::new(Study::read(&path).expect("a study"), &path).expect("a plan")
     }
 
     pub fn path(&self) -> &Path {

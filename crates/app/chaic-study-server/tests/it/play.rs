@@ -2,7 +2,7 @@
 //! reload, a pause and a restart; a repeated turn changes nothing; wrong turns get a clear refusal.
 
 use chaic_core::AgentId;
-use chaic_study::Plan;
+use chaic_study::StudyPlan;
 use chaic_study::data::DataRecord;
 use chaic_study::export::export;
 use chaic_study_server::{
@@ -17,7 +17,7 @@ use crate::kit::{Answer, Client, DEFINITION, Folder, SIMULATED, SLOW, TestHelper
 const SIDE_PX: u32 = 64;
 
 /// Starts the session that a page would have for the first trial of the first slot.
-fn local(plan: &Plan, level: InputLevel) -> LiveSession {
+fn local(plan: &StudyPlan, level: InputLevel) -> LiveSession {
     let trial = plan.trials(1)[0];
     let is_live = plan.study().play.world == chaic_study::WorldPace::RealTime;
     let is_helper = plan.study().play.seat == chaic_study::Seat::Helper;

@@ -11,7 +11,8 @@ use chaic_env::rules::differing_rules;
 use chaic_eval::report::write_files;
 use chaic_eval::run::{FolderMode, JobEvent, Run};
 use chaic_fidelity::{
-    ExperimentPart, ExperimentRequest, Matrix, ReportInputs, check_document, parts, write_document,
+    ExperimentFolder, ExperimentPart, ExperimentRequest, ReportInputs, check_document, parts,
+    write_document,
 };
 use serde_json::json;
 
@@ -31,25 +32,25 @@ pub fn run(arguments: &FidelityArguments, format: OutputFormat) -> Result<ExitSt
     let request = request(arguments);
     let doc = arguments.doc.clone().unwrap_or_else(|| arguments.out.join("fidelity.md"));
     check_document(&doc)?;
-    let matrix = if arguments.resume || arguments.only_document {
-        Matrix::resume(&arguments.out, &request)?
+    let experiment = if arguments.resume || arguments.only_document {
+        ExperimentFolder::resume(&arguments.out, &request)?
     } else {
-        Matrix::create(&arguments.out, &request, &BuiltInHelpers)?
+        ExperimentFolder::create(&arguments.out, &request, &BuiltInHelpers)?
     };
     if !arguments.only_document {
         let stop = interrupt::stop_flag()?;
         hide_worker_panics();
         let jobs = jobs(arguments.jobs);
         start_threads(jobs)?;
-        let parts = requested_parts(&request, &matrix);
-        check_build(&matrix, &parts, stop)?;
-        let is_complete = play(jobs, &parts, &matrix, stop);
+        let parts = requested_parts(&request, &experiment);
+        check_build(&experiment, &parts, stop)?;
+        let is_complete = play(jobs, &parts, &experiment, stop);
         if !is_complete.map_err(|e| anyhow!("{e:#}\n{}", how_to_resume(arguments)))? {
             print_error(&format!("stopped; {}", how_to_resume(arguments)));
             return Ok(ExitStatus::Interrupted);
         }
     }
-    finish(arguments, &matrix, &doc, format)
+    finish(arguments, &experiment, &doc, format)
 }
 
 fn request(arguments: &FidelityArguments) -> ExperimentRequest {
@@ -73,24 +74,27 @@ fn request(arguments: &FidelityArguments) -> ExperimentRequest {
 }
 
 /// Returns the parts to play now.
-fn requested_parts(request: &ExperimentRequest, matrix: &Matrix) -> Vec<ExperimentPart> {
+fn requested_parts(
+    request: &ExperimentRequest,
+    experiment: &ExperimentFolder,
+) -> Vec<ExperimentPart> {
     let is_requested = |part: &ExperimentPart| match (&part.switch, &request.switches) {
         (Some(rule), Some(rules)) => rules.contains(rule),
         _ => true,
     };
-    matrix.plan.parts().into_iter().filter(is_requested).collect()
+    experiment.plan.parts().into_iter().filter(is_requested).collect()
 }
 
 /// Plays these parts; returns whether they are complete.
 fn play(
     jobs: usize,
     requested: &[ExperimentPart],
-    matrix: &Matrix,
+    experiment: &ExperimentFolder,
     stop: &AtomicBool,
 ) -> Result<bool> {
     let mut pace = Pace { jobs, ..Pace::default() };
     for (k, part) in requested.iter().enumerate() {
-        let (folder, mut run) = (matrix.folder(part), open(matrix, part)?);
+        let (folder, mut run) = (experiment.folder(part), open(experiment, part)?);
         let extent = run.progress();
         let name = format!("part {} of {}, {}", k + 1, requested.len(), part.name);
         if extent.finished - extent.errors == extent.total && folder.join("report.md").exists() {
@@ -100,7 +104,7 @@ fn play(
             ));
             continue;
         }
-        pace.remaining = remaining_runs(matrix, &requested[k..])?;
+        pace.remaining = remaining_runs(experiment, &requested[k..])?;
         print_progress(&format!("{name}: {} of {} episode runs", extent.finished, extent.total));
         let mut bars = RunBars::for_part(extent, &name);
         let played = run.play(jobs, &BuiltInHelpers, stop, &mut |event| {
@@ -120,8 +124,8 @@ fn play(
     Ok(true)
 }
 
-fn open(matrix: &Matrix, part: &ExperimentPart) -> Result<Run> {
-    let (folder, given) = (matrix.folder(part), matrix.run_request(part)?);
+fn open(experiment: &ExperimentFolder, part: &ExperimentPart) -> Result<Run> {
+    let (folder, given) = (experiment.folder(part), experiment.run_request(part)?);
     let (run, warnings) = Run::open(&folder, FolderMode::Resume, &given, &BuiltInHelpers)?;
     warn_of_run(&run, &warnings);
     Ok(run)
@@ -130,23 +134,30 @@ fn open(matrix: &Matrix, part: &ExperimentPart) -> Result<Run> {
 /// Checks that this build plays like the one that started the runs of both rule sets.
 ///
 /// It does nothing if there are no results to compare, or if no episode run is missing.
-fn check_build(matrix: &Matrix, requested: &[ExperimentPart], stop: &AtomicBool) -> Result<()> {
-    let mut started: Vec<ExperimentPart> = matrix.plan.parts();
-    started.retain(|p| p.switch.is_none() && matrix.folder(p).join("run.json").exists());
-    if started.is_empty() || remaining_runs(matrix, requested)?.is_empty() {
+fn check_build(
+    experiment: &ExperimentFolder,
+    requested: &[ExperimentPart],
+    stop: &AtomicBool,
+) -> Result<()> {
+    let mut started: Vec<ExperimentPart> = experiment.plan.parts();
+    started.retain(|p| p.switch.is_none() && experiment.folder(p).join("run.json").exists());
+    if started.is_empty() || remaining_runs(experiment, requested)?.is_empty() {
         return Ok(());
     }
     print_progress("playing some episodes again to compare this build with the one of the runs");
     for part in started {
-        open(matrix, &part)?.check_build(&BuiltInHelpers, stop)?;
+        open(experiment, &part)?.check_build(&BuiltInHelpers, stop)?;
     }
     Ok(())
 }
 
 /// Counts the missing episode runs of these parts by helper.
-fn remaining_runs(matrix: &Matrix, requested: &[ExperimentPart]) -> Result<BTreeMap<String, u32>> {
+fn remaining_runs(
+    experiment: &ExperimentFolder,
+    requested: &[ExperimentPart],
+) -> Result<BTreeMap<String, u32>> {
     let mut remaining = BTreeMap::new();
-    for state in parts(matrix)?.iter().filter(|s| requested.contains(&s.part)) {
+    for state in parts(experiment)?.iter().filter(|s| requested.contains(&s.part)) {
         for key in state.missing() {
             *remaining.entry(key.helper.clone()).or_default() += 1;
         }
@@ -186,12 +197,12 @@ impl Pace {
 
 fn finish(
     arguments: &FidelityArguments,
-    matrix: &Matrix,
+    experiment: &ExperimentFolder,
     doc: &Path,
     format: OutputFormat,
 ) -> Result<ExitStatus> {
-    let states = parts(matrix)?;
-    write_document(ReportInputs { plan: &matrix.plan, parts: &states }, doc)?;
+    let states = parts(experiment)?;
+    write_document(ReportInputs { plan: &experiment.plan, parts: &states }, doc)?;
     let missing: usize = states.iter().map(|s| s.missing().len()).sum();
     let broken: usize = states.iter().map(|s| s.n_failed()).sum();
     let json = json!({ "document": doc, "missing": missing, "failed": broken });

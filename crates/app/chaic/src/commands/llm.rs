@@ -53,7 +53,7 @@ pub fn run(command: &LlmCommand, format: OutputFormat) -> Result<ExitStatus> {
         }
         LlmCommand::Check { language } => {
             require_text(format, "chaic llm check")?;
-            let settings = preset(language).over(settings_file(language)?.unwrap_or_default());
+            let settings = preset(language).apply_to(settings_file(language)?.unwrap_or_default());
             settings.check()?;
             print(&check::check(&settings)?)?;
         }
@@ -127,8 +127,8 @@ pub fn language(
         return Ok(Some(LanguageHelpers::replay(run, stop)?));
     }
     let settings = match (settings_file(given)?, recorded) {
-        (None, Some(recorded)) => preset(given).over_recorded(path, recorded)?,
-        (file, _) => preset(given).over(file.unwrap_or_default()),
+        (None, Some(recorded)) => preset(given).apply_to_recorded(path, recorded)?,
+        (file, _) => preset(given).apply_to(file.unwrap_or_default()),
     };
     Ok(Some(LanguageHelpers::live(settings, stop)?))
 }

@@ -11,7 +11,7 @@ use chaic_page::study_page;
 use chaic_sandbox::Launcher;
 use chaic_study::deletion::{DERIVED, delete};
 use chaic_study::export::{VerifiedTrial, export};
-use chaic_study::{Balance, Plan, Seat, Simulator, Study, Trial, page_content, simulate};
+use chaic_study::{Balance, Seat, Simulator, Study, StudyPlan, Trial, page_content, simulate};
 use serde_json::json;
 
 use super::{bars, table};
@@ -43,8 +43,8 @@ pub fn run(
     }
 }
 
-fn read(path: &Path) -> Result<Plan> {
-    Ok(Plan::new(Study::read(path)?, path)?)
+fn read(path: &Path) -> Result<StudyPlan> {
+    Ok(StudyPlan::new(Study::read(path)?, path)?)
 }
 
 /// Prints the plan of a study and the balance of simulated participants.
@@ -76,7 +76,7 @@ fn check(arguments: &StudyCheckArguments, format: OutputFormat) -> Result<ExitSt
     Ok(ExitStatus::Success)
 }
 
-fn check_text(plan: &Plan, balance: &Balance, dropout: u8) -> String {
+fn check_text(plan: &StudyPlan, balance: &Balance, dropout: u8) -> String {
     let Balance { arrived, completed, late, open_blocks, .. } = balance;
     let orders = plan.assignment().orders();
     let mut counts = table(["condition", "name", "complete, by position"]);
@@ -182,7 +182,12 @@ fn export_data(arguments: &StudyExportArguments, format: OutputFormat) -> Result
 }
 
 /// Writes the verified episodes in which people had this seat, without practice, as a LeRobot data set.
-fn write_lerobot(plan: &Plan, verified: &[VerifiedTrial], seat: Seat, out: &Path) -> Result<()> {
+fn write_lerobot(
+    plan: &StudyPlan,
+    verified: &[VerifiedTrial],
+    seat: Seat,
+    out: &Path,
+) -> Result<()> {
     let has_seat = |trial: &Trial| plan.conditions()[trial.condition].seat == seat;
     let chosen: Vec<&VerifiedTrial> =
         verified.iter().filter(|v| v.trial.position > 0 && has_seat(&v.trial)).collect();

@@ -16,7 +16,7 @@ pub fn run(
 ) -> Result<ExitStatus> {
     use std::time::Instant;
 
-    use chaic_study::{Plan, Simulator, Study};
+    use chaic_study::{Simulator, Study, StudyPlan};
     use chaic_study_server::{ServerOptions, StudyServer};
     use serde_json::json;
 
@@ -24,7 +24,7 @@ pub fn run(
     use crate::output::{counted, print_progress, print_result, print_warning, quoted_path};
 
     let StudyServeArguments { study, data, listen, hosts, .. } = arguments;
-    let plan = Plan::new(Study::read(study)?, study)?;
+    let plan = StudyPlan::new(Study::read(study)?, study)?;
     let (digest, slots) = (plan.digest().to_owned(), plan.study().participants);
     let goals = match plan.study().play.simulator {
         Simulator::Page => {
@@ -84,7 +84,7 @@ mod own_helpers {
     use chaic_eval::EvalError;
     use chaic_learn::helpers::{NamedPolicy, PolicyRegistry};
     use chaic_sandbox::Launcher;
-    use chaic_study::{Plan, Simulator};
+    use chaic_study::{Simulator, StudyPlan};
     use chaic_subprocess::CommandRegistry;
 
     use crate::arguments::{HelperArgument, StudyServeArguments};
@@ -92,7 +92,7 @@ mod own_helpers {
     /// Returns all helpers of the server. They live as long as the process.
     pub(super) fn registry(
         arguments: &StudyServeArguments,
-        plan: &Plan,
+        plan: &StudyPlan,
         launcher: &Launcher,
         stop: &'static AtomicBool,
     ) -> Result<&'static dyn HelperRegistry> {

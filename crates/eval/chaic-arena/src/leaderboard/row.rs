@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use chaic_core::TaskId;
 use chaic_eval::metrics::{HelperResults, Interval, Score, mean_rate};
-use chaic_eval::report::{GrantsFile, title};
+use chaic_eval::report::{RecordedGrants, title};
 use serde::Serialize;
 
 use super::{ConfirmedEntry, LeaderboardTable};
@@ -29,7 +29,7 @@ pub struct LeaderboardRow {
     /// SHA-256 of the packed submission; absent for a built-in helper that played for comparison.
     pub sha256: Option<String>,
     /// Grants, perception and isolation.
-    pub granted: Option<GrantsFile>,
+    pub granted: Option<RecordedGrants>,
     /// Mean transport rate over the episodes of all tasks, 0 to 1.
     pub tr: f64,
     /// Its 95 % interval over environments.
@@ -120,7 +120,7 @@ impl LeaderboardRow {
             sha256: None,
             granted: entry.score.grants.get(helper).cloned(),
             tr,
-            tr_ci: interval.map(|interval| interval.within(0.0, 1.0)),
+            tr_ci: interval.map(|interval| interval.clamped(0.0, 1.0)),
             ei: (n > 0.0).then(|| improvements.iter().sum::<f64>() / n),
             environments: interval.map_or(0, |interval| interval.environments),
             failed: scores.iter().map(|(_, score)| score.failed).sum(),

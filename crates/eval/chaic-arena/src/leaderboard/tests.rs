@@ -2,7 +2,7 @@
 
 use chaic_core::TaskId;
 use chaic_eval::metrics::{FormulaSet, PlayedEpisodes, RunStatus, Scores, Summary};
-use chaic_eval::report::GrantsFile;
+use chaic_eval::report::RecordedGrants;
 
 use super::*;
 use crate::score::SubmissionRecord;
@@ -52,7 +52,7 @@ fn entry(name: &str, conditions: &EvaluationConditions, rates: [u32; 6]) -> Conf
         .into_iter()
         .flat_map(|(helper, done)| (0..6).map(move |k| result(helper, k, done + k as u32 % 2)));
     let results: Vec<RunResult> = own.chain(others).collect();
-    let granted = GrantsFile {
+    let granted = RecordedGrants {
         grants: vec!["goal_place".to_owned(), "ids".to_owned()],
         perception: "ground_truth".to_owned(),
         isolation: None,

@@ -42,7 +42,10 @@ fn parse(text: &str) -> Result<Manifest> {
 fn a_manifest_has_values_and_defaults() {
     let manifest = parse(GOOD).expect("it is valid");
     assert_eq!(manifest.play.grants, Grants::PLANNER);
-    assert_eq!((manifest.play.track, manifest.play.perception.as_str()), (Track::Told, "gt"));
+    assert_eq!(
+        (manifest.play.track, manifest.play.perception.as_str()),
+        (Track::Unrestricted, "gt")
+    );
     assert_eq!(manifest.public.tasks, Some(vec![TaskId::Obstacle]));
     let words = ["python3", "helper.py"].map(str::to_owned).to_vec();
     assert_eq!(manifest.helper, HelperSource::Command(words));

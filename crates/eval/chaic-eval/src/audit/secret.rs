@@ -7,22 +7,22 @@ use chaic_world::Setup;
 
 /// Hidden property of the partner that a helper learns only if it is granted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Secret {
+pub enum HiddenProperty {
     /// Goal of the partner.
     Goal,
     /// Capability of the partner.
     Constraint,
 }
 
-impl Secret {
+impl HiddenProperty {
     /// All secrets.
-    pub const ALL: [Secret; 2] = [Secret::Goal, Secret::Constraint];
+    pub const ALL: [HiddenProperty; 2] = [HiddenProperty::Goal, HiddenProperty::Constraint];
 
     /// Changes the secret in a setup, and nothing that is visible.
     pub fn change(self, setup: &mut Setup) {
         match self {
-            Secret::Goal => change_goal(setup),
-            Secret::Constraint => change_constraint(setup),
+            HiddenProperty::Goal => change_goal(setup),
+            HiddenProperty::Constraint => change_constraint(setup),
         }
     }
 }

@@ -132,12 +132,12 @@ impl<'a> Clusters<'a> {
 
 impl Interval {
     /// Returns half the width: the smallest difference that the interval distinguishes from zero.
-    pub fn half(&self) -> f64 {
+    pub fn half_width(&self) -> f64 {
         (self.high - self.low) / 2.0
     }
 
     /// Returns the ends of the interval, clamped to the range of the metric.
-    pub fn within(&self, min: f64, max: f64) -> [f64; 2] {
+    pub fn clamped(&self, min: f64, max: f64) -> [f64; 2] {
         [self.low, self.high].map(|end| end.clamp(min, max))
     }
 }
@@ -167,7 +167,7 @@ mod tests {
         let i = houses(&[&[0.1], &[0.2], &[0.3]]).interval().unwrap();
         assert_close(i.mean, 0.2, 1e-9);
         assert_close(i.se, 0.1 / 3f64.sqrt(), 0.02);
-        assert_close(i.half(), 4.303 * i.se, 1e-9);
+        assert_close(i.half_width(), 4.303 * i.se, 1e-9);
         assert_eq!((i.environments, i.df), (3, 2));
         assert_eq!(Clusters::default().mean(), None);
         assert_eq!(houses(&[&[0.1, 0.5]]).interval(), None, "one house has no variance");
@@ -178,7 +178,7 @@ mod tests {
         let single = houses(&[&[0.1], &[0.2], &[0.6]]).interval().unwrap();
         let repeated = houses(&[&[0.1; 8], &[0.2; 8], &[0.6; 8]]).interval().unwrap();
         assert_close(repeated.se, single.se, 1e-9);
-        assert_close(repeated.half(), single.half(), 1e-9);
+        assert_close(repeated.half_width(), single.half_width(), 1e-9);
         // The variance within each house equals the variance between episodes, so houses do not
         // matter.
         let mixed = houses(&[&[0.1, 0.6], &[0.6, 0.1]]).interval().unwrap();

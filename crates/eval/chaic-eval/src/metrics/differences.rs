@@ -142,7 +142,7 @@ pub(super) fn rates<'a>(
 pub fn resolution(differences: &[Difference], task: Option<TaskId>) -> Option<Resolution> {
     let interval = |d: &Difference| task.map_or(d.all, |t| d.tasks.get(&t).copied());
     let intervals: Vec<Interval> = differences.iter().filter_map(interval).collect();
-    let mut halves: Vec<f64> = intervals.iter().map(Interval::half).collect();
+    let mut halves: Vec<f64> = intervals.iter().map(Interval::half_width).collect();
     halves.sort_by(f64::total_cmp);
     Some(Resolution {
         environments: intervals.iter().map(|i| i.environments).max()?,

@@ -159,7 +159,7 @@ impl Group<'_> {
         let counts = RunCounts { played: played as f64, failed: (rates.len() - played) as f64 };
         let (accuracy, completion) = self.deliveries(formulas);
         let improvement = self.improvements(formulas);
-        let ei_ci = improvement.interval().map(|i| i.within(-1.0, 1.0));
+        let ei_ci = improvement.interval().map(|i| i.clamped(-1.0, 1.0));
         let has_child = self.task.info().has_child && self.has_helper;
         Score {
             tr: mean(&rates).unwrap_or(0.0),
@@ -167,7 +167,7 @@ impl Group<'_> {
                 Spread::PopulationDeviation => population_sd(&rates),
                 Spread::StandardError => interval.map(|i| i.se),
             },
-            tr_ci: interval.map(|i| i.within(0.0, 1.0)),
+            tr_ci: interval.map(|i| i.clamped(0.0, 1.0)),
             ei: improvement.mean(),
             ei_ci,
             ia: counts.with_failed(accuracy, self.has_helper.then_some(0.0)),

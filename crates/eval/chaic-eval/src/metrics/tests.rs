@@ -213,17 +213,20 @@ fn differences_are_paired_with_intervals_over_houses() {
     assert_eq!((apart.helper.as_str(), apart.baseline.as_str()), ("rhp", "none"));
     let all = apart.all.unwrap();
     assert_close(Some(all.mean), 0.25);
-    assert_close_to_resampled(Some(all.half()), 3.182 * 0.129099 / 2.0);
+    assert_close_to_resampled(Some(all.half_width()), 3.182 * 0.129099 / 2.0);
     assert_eq!(apart.tasks[&TaskId::LowTarget], all, "there is one task only");
     // Two houses with means 0.15 and 0.35: standard deviation 0.141421, divided by sqrt(2); t(1) is
     // 12.706.
     let shared = difference(&houses(&["a", "a", "b", "b"])).all.unwrap();
     assert_close(Some(shared.mean), 0.25);
-    assert_close_to_resampled(Some(shared.half()), 12.706 * 0.1);
+    assert_close_to_resampled(Some(shared.half_width()), 12.706 * 0.1);
     assert_eq!((shared.environments, shared.df), (2, 1));
     assert_eq!(difference(&houses(&["a", "a", "a", "a"])).all, None);
     let r = resolution(&[difference(&houses(&["a", "a", "b", "b"]))], None).unwrap();
-    assert_eq!((r.environments, r.median, r.largest), (2, shared.half(), shared.half()));
+    assert_eq!(
+        (r.environments, r.median, r.largest),
+        (2, shared.half_width(), shared.half_width())
+    );
     assert_eq!(resolution(&[], None), None);
 }
 

@@ -22,7 +22,7 @@ pub struct Labels<'a> {
 
 /// Grants of one agent, as in `scores.json`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct GrantsFile {
+pub struct RecordedGrants {
     /// Names of the grants.
     pub grants: Vec<String>,
     /// Source of ids and classes: `ground_truth` if granted, `own` if the agent infers them from
@@ -84,13 +84,13 @@ impl Labels<'_> {
 
     /// Returns the grants of all helpers of the run by name, as in `scores.json`; `none` has no
     /// grants.
-    pub fn helpers_file(&self, helpers: &[String]) -> Option<BTreeMap<String, GrantsFile>> {
+    pub fn helper_grants(&self, helpers: &[String]) -> Option<BTreeMap<String, RecordedGrants>> {
         let granted = self.granted?;
         let file = |name: &String| {
             let perception = granted.perception.get(name);
             let grants =
-                granted.helpers.get(name).map(|grants| GrantsFile::new(grants, perception));
-            let none = || GrantsFile {
+                granted.helpers.get(name).map(|grants| RecordedGrants::new(grants, perception));
+            let none = || RecordedGrants {
                 grants: Vec::new(),
                 perception: "none".to_owned(),
                 isolation: None,
@@ -98,14 +98,14 @@ impl Labels<'_> {
             };
             let isolation = granted.isolation.get(name).cloned();
             let weights = granted.weights.get(name).cloned();
-            (name.clone(), GrantsFile { isolation, weights, ..grants.unwrap_or_else(none) })
+            (name.clone(), RecordedGrants { isolation, weights, ..grants.unwrap_or_else(none) })
         };
         Some(helpers.iter().map(file).collect())
     }
 
     /// Returns the grants of the partner, as in `scores.json`.
-    pub fn partner_file(&self) -> Option<GrantsFile> {
-        self.granted.map(|g| GrantsFile::new(&g.partner, None))
+    pub fn partner_grants(&self) -> Option<RecordedGrants> {
+        self.granted.map(|g| RecordedGrants::new(&g.partner, None))
     }
 
     /// Returns the grants of a helper in words; `None` for `none`.
@@ -136,11 +136,11 @@ impl Labels<'_> {
 /// Name of perception by ground-truth ids in files.
 const GROUND_TRUTH: &str = "ground_truth";
 
-impl GrantsFile {
-    fn new(grants: &Grants, perception: Option<&String>) -> GrantsFile {
+impl RecordedGrants {
+    fn new(grants: &Grants, perception: Option<&String>) -> RecordedGrants {
         let default = if grants.ids { GROUND_TRUTH } else { "own" };
         let perception = perception.map_or_else(|| default.to_owned(), String::clone);
-        GrantsFile { grants: names(grants), perception, isolation: None, weights: None }
+        RecordedGrants { grants: names(grants), perception, isolation: None, weights: None }
     }
 }
 

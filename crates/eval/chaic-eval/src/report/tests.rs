@@ -54,7 +54,7 @@ fn options() -> RunOptions {
         appearance: None,
         perception: None,
         behavior: None,
-        track: chaic_env::Track::Told,
+        track: chaic_env::Track::Unrestricted,
     }
 }
 

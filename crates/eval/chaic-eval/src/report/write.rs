@@ -15,7 +15,7 @@ use crate::metrics::{
 use crate::report::Format;
 use crate::report::coverage::coverage;
 use crate::report::figure::{figure_text, fits_figure, write_figure};
-use crate::report::labels::{GrantsFile, Labels};
+use crate::report::labels::{Labels, RecordedGrants};
 use crate::report::tables::{
     FAILED, MISSING, additional, counts, diagnostics, intervals, main_result, pairs, resolutions,
     run_pairs, stuck,
@@ -109,9 +109,9 @@ impl Report<'_> {
             #[serde(skip_serializing_if = "Option::is_none")]
             track: Option<Track>,
             #[serde(skip_serializing_if = "Option::is_none")]
-            helpers: Option<BTreeMap<String, GrantsFile>>,
+            helpers: Option<BTreeMap<String, RecordedGrants>>,
             #[serde(skip_serializing_if = "Option::is_none")]
-            partner: Option<GrantsFile>,
+            partner: Option<RecordedGrants>,
             #[serde(flatten)]
             scores: Scores,
         }
@@ -133,8 +133,8 @@ impl Report<'_> {
         let incomplete = !missing.is_empty();
         missing.truncate(MAX_NAMED);
         let (labels, scores) = (self.labels(), self.scores());
-        let helpers = labels.helpers_file(&self.options.helpers);
-        let partner = labels.partner_file();
+        let helpers = labels.helper_grants(&self.options.helpers);
+        let partner = labels.partner_grants();
         let track = Some(self.options.track).filter(|track| *track != Track::default());
         let file = File { episode_runs, incomplete, missing, track, helpers, partner, scores };
         serde_json::to_string_pretty(&file).expect("scores have string keys") + "\n"
@@ -231,7 +231,7 @@ impl Report<'_> {
 
     fn csv(&self) -> String {
         let scores = self.scores();
-        let granted = self.labels().helpers_file(&self.options.helpers).unwrap_or_default();
+        let granted = self.labels().helper_grants(&self.options.helpers).unwrap_or_default();
         let names = CSV_VALUES.map(|(name, _)| name).join(",");
         let mut text = format!(
             "task,helper,grants,perception,{names},episodes,environments,broken,incomplete\n"

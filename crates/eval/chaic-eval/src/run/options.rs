@@ -48,7 +48,7 @@ pub struct RunOptions {
     /// verified or replayed.
     #[serde(default = "default_true", skip_serializing_if = "is_true")]
     pub traces: bool,
-    /// Helper program that drives the partner; absent for the rule-based partner.
+    /// Agent that controls the partner, the value of `--partner`; absent for the rule-based partner.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub partner: Option<String>,
     /// Change of the partner's body; absent for the person in each episode.
@@ -60,7 +60,8 @@ pub struct RunOptions {
     /// Object detection of helpers, the value of `--perception`; absent for ids from ground truth.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub perception: Option<String>,
-    /// Behavior recognition of helpers, the value of `--behavior`; absent for granted behavior.
+    /// Behavior recognition of helpers, the value of `--behavior`; absent for `gt`: granted actions, or else
+    /// inference from the objects in the partner's hands.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub behavior: Option<String>,
     /// Track, which limits the grants of helpers; the default allows all grants.

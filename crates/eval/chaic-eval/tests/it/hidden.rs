@@ -11,14 +11,16 @@ use chaic_env::helper_registry::{BuiltInHelpers, Helper, HelperRegistry as _};
 use chaic_env::rules::RuleSet;
 use chaic_env::{Env, EpisodeConfig};
 use chaic_episodes::{Episode, find_episode};
-use chaic_eval::audit::{Leak, Pair, PartnerMode, ProbeAgent, Secret, Violation, compare};
+use chaic_eval::audit::{
+    HiddenProperty, Leak, PartnerMode, ProbeAgent, RunPair, Violation, compare,
+};
 
 /// Number of frames: enough to explore, pick up and deliver.
 const FRAMES: u32 = 900;
 
-fn pair(episode: &Episode, secret: Secret, partner: PartnerMode) -> Pair<'_> {
+fn pair(episode: &Episode, secret: HiddenProperty, partner: PartnerMode) -> RunPair<'_> {
     let rules = RuleSet::PAPER;
-    Pair { episode, secret, partner, rules, frames: FRAMES, image_size: 48 }
+    RunPair { episode, secret, partner, rules, frames: FRAMES, image_size: 48 }
 }
 
 fn episode_of_task(task: TaskId) -> Episode {
@@ -36,11 +38,11 @@ fn probe_agent(episode: &Episode, has_camera: bool, grants: Grants) -> Helper {
 }
 
 /// Returns every task, with a change of the goal or the constraint alternately.
-fn tasks_and_secrets() -> impl Iterator<Item = (TaskId, Secret)> {
-    TaskId::all().enumerate().map(|(k, task)| (task, Secret::ALL[k % 2]))
+fn tasks_and_secrets() -> impl Iterator<Item = (TaskId, HiddenProperty)> {
+    TaskId::all().enumerate().map(|(k, task)| (task, HiddenProperty::ALL[k % 2]))
 }
 
-fn check_no_violation(pair: &Pair<'_>, observer: &str, make: &dyn Fn() -> Helper) -> usize {
+fn check_no_violation(pair: &RunPair<'_>, observer: &str, make: &dyn Fn() -> Helper) -> usize {
     let result = compare(pair, make, None).unwrap();
     let id = pair.episode.id();
     if let Some(violation) = result.violation {
@@ -81,7 +83,7 @@ fn a_probe_agent_learns_no_secret() {
 fn violation_of(leak: Leak) -> Option<Violation> {
     for (task, secret) in tasks_and_secrets() {
         let episode = episode_of_task(task);
-        let acting = Pair { frames: 2000, ..pair(&episode, secret, PartnerMode::Acts) };
+        let acting = RunPair { frames: 2000, ..pair(&episode, secret, PartnerMode::Acts) };
         let make = || probe_agent(&episode, false, Grants::IDS);
         let result = compare(&acting, &make, Some(leak)).unwrap();
         if result.violation.is_some() {
@@ -102,13 +104,18 @@ fn every_artificial_leak_is_found() {
 fn granted_secrets_are_found() {
     // The audit finds information that is granted to the oracle: the goal.
     let episode = episode_of_task(TaskId::HighTarget);
-    let result =
-        compare(&pair(&episode, Secret::Goal, PartnerMode::Waits), &|| built_in("oracle"), None);
+    let result = compare(
+        &pair(&episode, HiddenProperty::Goal, PartnerMode::Waits),
+        &|| built_in("oracle"),
+        None,
+    );
     assert!(result.unwrap().violation.is_some_and(|v| v.part == "the briefing"));
     // The constraint is not granted.
-    check_no_violation(&pair(&episode, Secret::Constraint, PartnerMode::Waits), "oracle", &|| {
-        built_in("oracle")
-    });
+    check_no_violation(
+        &pair(&episode, HiddenProperty::Constraint, PartnerMode::Waits),
+        "oracle",
+        &|| built_in("oracle"),
+    );
 }
 
 /// Agent that checks each observation with a function.

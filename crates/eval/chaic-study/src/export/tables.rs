@@ -10,7 +10,7 @@ use super::{CheckedTrace, description};
 use crate::data::TrialEnd;
 use crate::error::Result;
 use crate::forms::Form;
-use crate::plan::{Plan, Trial, short_digest};
+use crate::plan::{StudyPlan, Trial, short_digest};
 
 /// Columns of the rows of all tables.
 const COMMON: [(&str, &str); 4] = [
@@ -56,7 +56,12 @@ pub(super) struct TrialRow {
 
 impl TrialRow {
     /// Creates the row of a trial without a trace.
-    pub(super) fn new(plan: &Plan, trial: Trial, number: usize, outcome: TrialEnd) -> TrialRow {
+    pub(super) fn new(
+        plan: &StudyPlan,
+        trial: Trial,
+        number: usize,
+        outcome: TrialEnd,
+    ) -> TrialRow {
         let key = plan.key(trial);
         let cells = [key.episode, key.helper, outcome.name().to_owned()];
         TrialRow { trial, number, cells, checked: None, trace: String::new() }
@@ -75,7 +80,7 @@ pub(super) struct Tables {
 
 impl Tables {
     /// Creates empty tables.
-    pub(super) fn new(plan: &Plan) -> Tables {
+    pub(super) fn new(plan: &StudyPlan) -> Tables {
         let levels = |c: &crate::plan::Condition| {
             let levels = c.levels.iter().map(|(_, level)| level.clone());
             std::iter::once(c.name.clone()).chain(levels).collect::<Vec<String>>()
@@ -142,7 +147,7 @@ impl Tables {
     /// Adds the answers to a form, and its score.
     pub(super) fn add_answers(
         &mut self,
-        plan: &Plan,
+        plan: &StudyPlan,
         participant: (&str, u32),
         trial: Option<Trial>,
         name: &str,
@@ -163,7 +168,7 @@ impl Tables {
     }
 
     /// Writes the tables and then the description of the data set.
-    pub(super) fn write(&self, plan: &Plan, out: &Path) -> Result<()> {
+    pub(super) fn write(&self, plan: &StudyPlan, out: &Path) -> Result<()> {
         let folder = out.join("data");
         create_folders(&folder)?;
         let tables =

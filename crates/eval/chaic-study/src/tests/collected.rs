@@ -10,7 +10,7 @@ use chaic_env::trace::Record;
 use chaic_env::{AdvanceOutcome, AgentSlot, Env, EpisodeAgents, EpisodeConfig};
 use serde_json::{Value, json};
 
-use super::{Plan, SMALL, StudyError, folder_with, plan_of};
+use super::{SMALL, StudyError, StudyPlan, folder_with, plan_of};
 use crate::data::{FORMAT, VERSION};
 use crate::deletion::delete;
 use crate::export::export;
@@ -21,7 +21,7 @@ const CODE: &str = "K7QXM2RBTA";
 const OTHER: &str = "ABCDEFGH23";
 
 /// Plays some turns of a trial as the page does, and returns the lines of its trace.
-fn played(plan: &Plan, number: usize, slot: u32) -> String {
+fn played(plan: &StudyPlan, number: usize, slot: u32) -> String {
     let trial = plan.trials(slot)[number];
     assert_eq!(plan.conditions()[trial.condition].seat, Seat::Partner);
     let episode = &plan.episodes()[trial.episode];
@@ -49,7 +49,7 @@ fn played(plan: &Plan, number: usize, slot: u32) -> String {
 }
 
 /// Returns the records of a participant who plays the practice episode in two parts.
-fn records(plan: &Plan, code: &str, slot: u32) -> Vec<Value> {
+fn records(plan: &StudyPlan, code: &str, slot: u32) -> Vec<Value> {
     let trace = played(plan, 0, slot);
     let (first, rest) = trace.split_at(trace.find('\n').expect("a line") + 1);
     let trust = json!({ "confident": 6, "reliable": null, "trust": 7 });

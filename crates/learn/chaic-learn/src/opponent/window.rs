@@ -340,7 +340,10 @@ impl ObservationHistory {
 
 /// Returns objects that are believed to rest where they were last seen.
 fn resting_objects(memory: &Memory) -> impl Iterator<Item = &MappedObject> {
-    memory.objects.iter().filter(|t| t.is_present && !t.is_gone && t.held_until <= memory.frame)
+    memory
+        .objects
+        .iter()
+        .filter(|t| t.is_present && !t.is_out_of_play && t.held_until <= memory.frame)
 }
 
 /// Returns known goal places.

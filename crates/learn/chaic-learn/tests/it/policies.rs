@@ -13,7 +13,7 @@ use chaic_env::rules::RuleSet;
 use chaic_env::trace::Record;
 use chaic_env::{Env, EpisodeConfig};
 use chaic_episodes::find_episode;
-use chaic_eval::audit::{Pair, PartnerMode, Secret, compare};
+use chaic_eval::audit::{HiddenProperty, PartnerMode, RunPair, compare};
 use chaic_learn::actor_critic::ActorCritic as _;
 use chaic_learn::bundled::BundledHelper;
 use chaic_learn::helpers::{NamedPolicy, PolicyRegistry};
@@ -108,13 +108,13 @@ fn bundled_helpers_learn_no_secret() {
     let registry = bundled();
     for (k, task) in TaskId::paper().enumerate() {
         let episode = find_episode(&format!("{task}/gen/501")).unwrap();
-        let secret = Secret::ALL[k % Secret::ALL.len()];
+        let secret = HiddenProperty::ALL[k % HiddenProperty::ALL.len()];
         // The task of the other bundled helpers is granted.
         let helper = || registry.make("cloned", PlannerRules::paper()).unwrap();
         for partner in [PartnerMode::Acts, PartnerMode::Waits] {
             let rules = RuleSet::PAPER;
             let episode = &episode;
-            let pair = Pair { episode, secret, partner, rules, frames: 900, image_size: 48 };
+            let pair = RunPair { episode, secret, partner, rules, frames: 900, image_size: 48 };
             let result = compare(&pair, &helper, None).unwrap();
             if let Some(violation) = result.violation {
                 panic!("{task}, {secret:?}, partner {partner:?}: {violation}");

@@ -16,7 +16,7 @@ pub struct ClipCollectionConfig {
     /// Fraction of episodes with random lights and colors.
     #[serde(alias = "varied")]
     pub varied_fraction: f32,
-    /// Fraction of episodes recorded by helpers with the shipped detector. Their crops have
+    /// Fraction of episodes recorded by helpers with the bundled detector. Their crops have
     /// realistic localization errors.
     #[serde(alias = "learned")]
     pub learned_fraction: f32,

@@ -30,7 +30,7 @@ impl Default for BehaviorNetwork {
 }
 
 impl BehaviorNetwork {
-    /// Creates the network that is trained and shipped.
+    /// Creates the network that is trained and bundled.
     pub fn new() -> BehaviorNetwork {
         let mut net = Network::default();
         let mut features = net.input(N_CHANNELS);
@@ -81,10 +81,10 @@ fn file_layout(network: &BehaviorNetwork) -> Network {
 }
 
 impl TrainedBehavior {
-    /// Returns the network that chaic ships; weights/README.md documents its training and accuracy.
+    /// Returns the network that is part of chaic; weights/README.md documents its training and accuracy.
     pub fn built_in() -> TrainedBehavior {
         let bytes = include_bytes!("../../weights/behavior.safetensors");
-        TrainedBehavior::from_bytes(bytes).expect("a test reads the shipped weights")
+        TrainedBehavior::from_bytes(bytes).expect("a test reads the bundled weights")
     }
 
     /// Reads a safetensors file.

@@ -197,7 +197,7 @@ impl LearnedBehavior {
             |object: &MappedObject| memory.hands.all().any(|(track, _)| track == object.track);
         let movable = memory.objects.iter().filter(|object| {
             object.is_present
-                && !object.is_gone
+                && !object.is_out_of_play
                 && object.class.info().is_movable()
                 && object.held_until <= memory.frame
                 && !is_held(object)

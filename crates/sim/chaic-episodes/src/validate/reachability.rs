@@ -174,8 +174,8 @@ fn walkable(
     let stands = [Rules::paper().step_over_m, height_m];
     let stays = setup.things.iter().filter(|t| {
         let info = t.class.info();
-        let is_gone = info.role == Role::Obstacle && obstacles == Obstacles::Removed;
-        t.fixed || !(info.is_carriable() || is_gone)
+        let is_out_of_play = info.role == Role::Obstacle && obstacles == Obstacles::Removed;
+        t.fixed || !(info.is_carriable() || is_out_of_play)
     });
     let stays =
         stays.filter(|t| t.class.info().role != Role::Vehicle).flat_map(UprightBox::from_object);

@@ -113,7 +113,7 @@ impl World {
     }
 
     /// Decides whether a put-on succeeds, and plans its steps.
-    pub(crate) fn judge_put(
+    pub(crate) fn decide_put_on(
         &mut self,
         agent: AgentId,
         activity: &mut Activity,
@@ -255,14 +255,14 @@ impl World {
     }
 
     /// Chooses a spot for a removed obstacle, and plans the steps.
-    pub(crate) fn judge_aside(
+    pub(crate) fn choose_set_down_spot(
         &mut self,
         agent: AgentId,
         activity: &mut Activity,
         hand: Hand,
         obstacle: EntityId,
     ) -> StepProgress {
-        let at = self.spot_aside(agent, obstacle);
+        let at = self.set_down_spot(agent, obstacle);
         let d = self.rules.durations;
         let release =
             Phase::Release { hand: Some(hand), object: obstacle, on: None, at, set_down: true };
@@ -295,7 +295,7 @@ impl World {
         let is_aside = set_down && on.is_none();
         // An agent may have moved to the spot meanwhile.
         let is_taken = is_aside && !self.is_free_floor(object, at);
-        let at = if is_taken { self.spot_aside(agent, object) } else { at };
+        let at = if is_taken { self.set_down_spot(agent, object) } else { at };
         let state = self.object_mut(object);
         state.released_at = goal_place;
         state.last_holder = Some(agent);

@@ -68,7 +68,7 @@ impl World {
 
     /// Decides whether a pick-up succeeds, and plans the reach, the grasp and the return of the
     /// arm.
-    pub(crate) fn judge_take(
+    pub(crate) fn decide_pick_up(
         &mut self,
         agent: AgentId,
         activity: &mut Activity,
@@ -178,7 +178,7 @@ impl World {
         {
             let from = self.hand_in_world(agent, hand);
             activity.queue = vec![
-                ActionStep::new(Phase::JudgeAside { hand, obstacle: object }, 0),
+                ActionStep::new(Phase::ChooseSetDownSpot { hand, obstacle: object }, 0),
                 self.reset_arms(Some(hand), from),
             ];
         }

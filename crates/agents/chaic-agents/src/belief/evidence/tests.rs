@@ -154,7 +154,7 @@ fn the_agents_own_pick_ups_never_count() {
     observer.observe(10, &[]);
     assert_eq!(observer.strength(APPLE), None, "it vanished into the own hands");
     observer.memory.delivered.insert(APPLE);
-    observer.memory.objects.mark_gone(APPLE);
+    observer.memory.objects.mark_out_of_play(APPLE);
     let evidence = observer.observe(20, &[]);
     assert!(evidence.taken.is_empty());
     assert_eq!(evidence.delivered.keys().collect::<Vec<_>>(), [&APPLE]);

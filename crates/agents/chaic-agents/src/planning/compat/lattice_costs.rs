@@ -171,8 +171,10 @@ fn lattice_costs(
     latest.clear();
     latest.extend(inputs.map.cells().map(|cell| cell.state() >= CellOccupancy::Occupied));
     let is_obstacle = |role| matches!(role, Role::Obstacle | Role::HeavyTarget);
-    let present =
-        inputs.objects.iter().filter(|t| t.is_present && !t.is_gone && inputs.now >= t.held_until);
+    let present = inputs
+        .objects
+        .iter()
+        .filter(|t| t.is_present && !t.is_out_of_play && inputs.now >= t.held_until);
     let obstacles: Vec<_> = present.filter(|t| is_obstacle(t.class.info().role)).collect();
     for cell in obstacles.iter().flat_map(|t| &t.footprint).filter_map(|p| grid.cell_at(*p)) {
         latest[cell] = true;

@@ -4,7 +4,7 @@ use chaic_core::agent::PartnerBelief;
 use chaic_core::briefing::CompanionRole;
 use chaic_core::{Briefing, ClassId, Frame};
 
-use super::constants::MIN_EXTRA;
+use super::constants::MIN_EXTRA_PROBABILITY;
 use super::{InferPolicy, Step};
 use crate::belief::{AttemptKind, Belief, Evidence};
 use crate::memory::Memory;
@@ -42,11 +42,14 @@ pub(super) fn partner_belief(
 /// Returns the classes outside the most likely set that are probably wanted.
 fn extra_classes(belief: &Belief, briefing: &Briefing) -> Vec<ClassId> {
     let (set, probability) = belief.goal.most_likely();
-    if probability < MIN_EXTRA {
+    if probability < MIN_EXTRA_PROBABILITY {
         return Vec::new();
     }
     let outside = briefing.possible_targets.iter().filter(|c| !c.info().sets.contains(&set));
-    outside.filter(|c| belief.goal.probability_wanted(**c) >= MIN_EXTRA).copied().collect()
+    outside
+        .filter(|c| belief.goal.probability_wanted(**c) >= MIN_EXTRA_PROBABILITY)
+        .copied()
+        .collect()
 }
 
 /// Describes the observations of the partner in the order of their frames, then the objects that it

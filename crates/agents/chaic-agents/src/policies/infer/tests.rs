@@ -170,7 +170,7 @@ fn without_evidence_it_follows_a_visible_partner_and_explores_otherwise() {
     assert_eq!(episode.step(200, &fruit), Plan::FollowPartner, "seen 190 frames ago");
     assert_eq!(episode.step(210, &fruit), Plan::Explore, "lost");
     assert_eq!(episode.policy.identified, None);
-    let options = InferOptions { watches: false, ..InferOptions::ALL };
+    let options = InferOptions { follows_partner: false, ..InferOptions::ALL };
     let mut episode = Episode::ready(options, house);
     assert_eq!(episode.step(10, &with_partner), Plan::Explore, "it never watches");
 }
@@ -186,8 +186,9 @@ fn while_the_goal_is_unclear_it_still_empties_full_hands() {
 fn takes_of_fruit_make_it_fetch_fruit() {
     let pen = seen(TrackId(43), "pen", [-0.5, 0.0, 0.5], 0.1, 0.1);
     let all = [bed(), apple(), pen, seen_partner(1.0, -2.0)];
-    for (plans, mode) in [(true, "plan"), (false, "rules")] {
-        let mut episode = Episode::ready(InferOptions { plans, ..InferOptions::ALL }, house);
+    for (uses_team_planner, mode) in [(true, "plan"), (false, "rules")] {
+        let mut episode =
+            Episode::ready(InferOptions { uses_team_planner, ..InferOptions::ALL }, house);
         assert_eq!(episode.step(0, &all), Plan::FollowPartner);
         episode.take(60, "apple");
         episode.take(61, "orange");
@@ -330,7 +331,9 @@ fn an_empty_list_of_targets_leads_to_exploration() {
 
 #[test]
 fn contradictory_takes_still_lead_to_valid_plans() {
-    for options in [InferOptions::ALL, InferOptions { plans: false, ..InferOptions::ALL }] {
+    for options in
+        [InferOptions::ALL, InferOptions { uses_team_planner: false, ..InferOptions::ALL }]
+    {
         let mut episode = Episode::ready(options, house);
         let all = [bed(), apple(), banana(), seen_partner(1.0, -2.0)];
         let classes = episode.briefing.possible_targets.clone();
@@ -346,8 +349,8 @@ fn every_plan_of_random_episodes_is_valid() {
     let mut rng = RngStream::new(5, "infer test", 0);
     let parts = [(true, true, true), (false, true, true), (true, false, true), (true, true, false)];
     for case in 0..12 {
-        let (watches, infers_constraint, plans) = parts[case % parts.len()];
-        let options = InferOptions { watches, infers_constraint, plans };
+        let (follows_partner, infers_constraint, uses_team_planner) = parts[case % parts.len()];
+        let options = InferOptions { follows_partner, infers_constraint, uses_team_planner };
         let mut episode = Episode::new(options, |briefing| match case % 3 {
             0 => house(briefing),
             1 => apples(briefing),

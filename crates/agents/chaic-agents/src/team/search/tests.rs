@@ -22,7 +22,7 @@ fn the_result_is_never_worse_than_any_candidate_or_the_greedy_sequences() {
     for case in 0..50 {
         let problem = random_problem(&mut rng);
         let candidates: Vec<_> = (0..3).map(|_| random_sequence(&problem, &mut rng)).collect();
-        let plan = improve(&problem, &candidates, SHORT, &mut rng);
+        let plan = search_operations(&problem, &candidates, SHORT, &mut rng);
         let value = simulate(&problem, &plan.operations);
         assert!(value >= plan.value, "{case}: useless operations do not lower the value");
         let greedy = [(false, false), (false, true), (true, false), (true, true)]
@@ -58,7 +58,7 @@ fn the_best_of_all_sequences_of_three_targets_is_found() {
         let places = [Target, Target, Target, Goal, Goal].map(|kind| (kind, at()));
         let problem = plane(helper, (case % 2 == 0).then_some(partner), &places);
         let optimum = brute_force(&problem, &[], &[0, 1, 2]);
-        let plan = improve(&problem, &[], SearchSettings::DEFAULT, &mut rng);
+        let plan = search_operations(&problem, &[], SearchSettings::DEFAULT, &mut rng);
         let value = simulate(&problem, &plan.operations);
         assert!((value - optimum).abs() < 1e-5, "{case}: {value} instead of {optimum}");
         let greedy = simulate(&problem, &greedy(&problem, false, false));
@@ -72,7 +72,7 @@ fn the_same_seed_gives_the_same_plan() {
     let problem = random_problem(&mut RngStream::new(9, "team search", 0));
     let [a, b] = [0, 1].map(|_| {
         let mut rng = RngStream::new(3, "team search", 1);
-        let plan = improve(&problem, &[], SHORT, &mut rng);
+        let plan = search_operations(&problem, &[], SHORT, &mut rng);
         (plan, rng.seed())
     });
     assert_eq!(a, b);
@@ -126,7 +126,8 @@ fn an_empty_problem_has_an_empty_plan() {
     for partner in [None, Some(0.0)] {
         let mut problem = line(0.0, partner, &[]);
         problem.hypotheses.clear();
-        let plan = improve(&problem, &[], SHORT, &mut RngStream::new(1, "team search", 2));
+        let plan =
+            search_operations(&problem, &[], SHORT, &mut RngStream::new(1, "team search", 2));
         assert_eq!(plan, TeamPlan { operations: Vec::new(), value: 0.0 });
     }
 }

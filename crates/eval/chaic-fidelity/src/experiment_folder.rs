@@ -27,7 +27,7 @@ const MAX_FILE_BYTES: u64 = 1 << 20;
 
 /// All runs below one folder.
 #[derive(Clone, Debug)]
-pub struct Matrix {
+pub struct ExperimentFolder {
     /// Path of the folder.
     pub path: PathBuf,
     /// Plan of the runs.
@@ -58,7 +58,7 @@ struct PlanFile {
     plan: Experiment,
 }
 
-impl Matrix {
+impl ExperimentFolder {
     /// Creates an experiment in a new or empty folder.
     ///
     /// # Errors
@@ -67,7 +67,7 @@ impl Matrix {
         path: &Path,
         request: &ExperimentRequest,
         helpers: &dyn HelperRegistry,
-    ) -> Result<Matrix> {
+    ) -> Result<ExperimentFolder> {
         // An experiment that was interrupted while it was created leaves only this file.
         let unfinished = format!("{FILE}{TEMPORARY_SUFFIX}");
         let mut entries = std::fs::read_dir(path).into_iter().flatten().flatten();
@@ -77,10 +77,13 @@ impl Matrix {
         let episodes = request.episodes.clone().ok_or_else(|| {
             EvalError::Options("give the folder with episode files by --episodes".to_owned())
         })?;
-        let matrix =
-            Matrix { path: path.to_owned(), plan: request.new_plan(&episodes)?, episodes: None };
+        let matrix = ExperimentFolder {
+            path: path.to_owned(),
+            plan: request.new_plan(&episodes)?,
+            episodes: None,
+        };
         matrix.plan.check_names(&episodes, helpers)?;
-        let matrix = Matrix { episodes: Some(episodes), ..matrix };
+        let matrix = ExperimentFolder { episodes: Some(episodes), ..matrix };
         create_folders(path)?;
         matrix.write()?;
         Ok(matrix)
@@ -90,10 +93,11 @@ impl Matrix {
     ///
     /// # Errors
     /// If there is no experiment, or it was created with other options.
-    pub fn resume(path: &Path, request: &ExperimentRequest) -> Result<Matrix> {
+    pub fn resume(path: &Path, request: &ExperimentRequest) -> Result<ExperimentFolder> {
         let recorded = read(path)?;
         let plan = request.resumed_plan(&recorded, path)?;
-        let matrix = Matrix { path: path.to_owned(), plan, episodes: request.episodes.clone() };
+        let matrix =
+            ExperimentFolder { path: path.to_owned(), plan, episodes: request.episodes.clone() };
         if matrix.plan != recorded {
             matrix.write()?;
         }
@@ -178,7 +182,7 @@ fn read(path: &Path) -> Result<Experiment> {
 ///
 /// # Errors
 /// If no run has started, or one cannot be read.
-pub fn parts(matrix: &Matrix) -> Result<Vec<PartState>> {
+pub fn parts(matrix: &ExperimentFolder) -> Result<Vec<PartState>> {
     let parts = matrix.plan.parts();
     let has_started = |part: &ExperimentPart| RunFolder::is_run(&matrix.folder(part));
     let Some(first) = parts.iter().find(|p| has_started(p)) else {

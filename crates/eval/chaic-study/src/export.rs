@@ -14,9 +14,9 @@ use serde_json::json;
 
 use crate::data::{DataRecord, ParticipantData, TrialEnd};
 use crate::error::{Result, StudyError};
-use crate::plan::{PERSON, StudyPlan, Trial};
+use crate::plan::{StudyPlan, Trial};
 use crate::record_check::RecordCheck;
-use crate::study::Seat;
+use crate::study::{PERSON, Seat};
 use tables::{Tables, TrialRow};
 
 /// Ending of the files of participants.

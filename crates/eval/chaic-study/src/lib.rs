@@ -29,13 +29,13 @@ pub use assignment::Assignment;
 pub use content::page_content;
 pub use data::ParticipantData;
 pub use error::{Result, StudyError};
-pub use plan::{Condition, PERSON, SEED, StudyPlan, Trial};
+pub use plan::{Condition, SEED, StudyPlan, Trial};
 pub use record_check::RecordCheck;
 pub use simulation::{Balance, simulate};
 pub use slots::{SlotHolder, lowest_free_slot};
 pub use study::{
-    Design, Factors, FormPlan, Input, MAX_PARTICIPANTS, PlaySettings, Seat, Simulator, Study,
-    WorldPace,
+    Design, Factors, FormPlan, Input, MAX_PARTICIPANTS, PERSON, PlaySettings, Seat, Simulator,
+    Study, WorldPace,
 };
 
 #[cfg(test)]

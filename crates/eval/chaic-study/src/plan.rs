@@ -11,7 +11,7 @@ use sha2::{Digest as _, Sha256};
 use crate::assignment::Assignment;
 use crate::error::Result;
 use crate::forms::Form;
-use crate::study::{Design, Input, Seat, Study};
+use crate::study::{Design, Input, PERSON, Seat, Study};
 
 /// Maximum number of conditions of a Latin square, which every participant plays.
 const MAX_WITHIN: usize = 16;
@@ -233,9 +233,6 @@ impl StudyPlan {
         words as f64 / WORDS_PER_MINUTE + (played_secs + items * ITEM_SECS) / 60.0
     }
 }
-
-/// Name of a person in traces.
-pub const PERSON: &str = "human";
 
 /// Episodes that were looked up, each once.
 #[derive(Default)]

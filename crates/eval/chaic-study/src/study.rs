@@ -11,8 +11,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Result, StudyError};
 use crate::forms::Form;
-use crate::plan::PERSON;
 
+/// Name of a person in traces.
+pub const PERSON: &str = "human";
 /// Maximum size of `study.toml` and of each text, bytes: a text of 10,000 words.
 const MAX_TEXT_BYTES: u64 = 64 << 10;
 /// Maximum number of participants, which bounds the size of the page.

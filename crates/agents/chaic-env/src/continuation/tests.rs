@@ -108,7 +108,7 @@ fn a_helper_that_took_over_acts_again_as_recorded_and_remembers_what_was_before(
 
 #[test]
 fn a_continuation_survives_joint_lifts_of_the_original_rules() {
-    let episode = short_episode("moving_house/test/00");
+    let episode = short_episode("moving_house/train/01");
     let parent = played_episode(&episode, RuleSet::COMPAT, "rhp", None);
     assert!(parent.contains("lifted_together"), "the partner engages the helper");
     let branch =

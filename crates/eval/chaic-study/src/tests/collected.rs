@@ -14,7 +14,7 @@ use super::{SMALL, StudyError, StudyPlan, folder_with, plan_of};
 use crate::data::{FORMAT, VERSION};
 use crate::deletion::delete;
 use crate::export::export;
-use crate::plan::PERSON;
+use crate::study::PERSON;
 use crate::study::Seat;
 
 const CODE: &str = "K7QXM2RBTA";

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes docs/reference/language-prompts.md: prompts of all tasks, of `llm-told` and of a partner, and a record.
+"""Writes docs/reference/language-prompts.md: prompts of all tasks, of `llm_known_task` and of a partner, and a record.
 
 Plays the first test episode of each task with the stand-in for a language model and takes the
 longest prompt of each run, which has the longest history.
@@ -32,13 +32,13 @@ TITLES = {
 }
 HEAD = """# Prompts and a transcript
 
-One prompt of each task with `--helper llm`, one with `--helper llm-told`, one for a partner, and a record of an episode.
+One prompt of each task with `--helper llm`, one with `--helper llm_known_task`, one for a partner, and a record of an episode.
 **The answers are a scripted stand-in's, not a language model's**: they show only the form. `benches/prompts/run.py`
 writes this page. By hand:
 
 ```sh
 cargo run -p chaic-llm-standin &
-chaic eval --n-episodes 1 --helper llm,llm-told --endpoint http://127.0.0.1:8808/v1 --model standin --out runs/prompts
+chaic eval --n-episodes 1 --helper llm,llm_known_task --endpoint http://127.0.0.1:8808/v1 --model standin --out runs/prompts
 chaic eval --task low_target --n-episodes 1 --helper none --partner llm \\
     --endpoint http://127.0.0.1:8808/v1 --model standin --out runs/partner
 chaic llm show runs/prompts high_target/test/00        # and so on
@@ -82,7 +82,7 @@ def main():
     with serving(standin) as address:
         model = ["--endpoint", address, "--model", "standin"]
         for run, options in {
-            "helpers": ["--helper", "llm,llm-told"],
+            "helpers": ["--helper", "llm,llm_known_task"],
             "partner": ["--task", "low_target", "--helper", "none", "--partner", "llm"],
         }.items():
             command = [chaic, "eval", "--n-episodes", "1", *options, *model, "--out", out / run]
@@ -90,7 +90,7 @@ def main():
     page = [HEAD]
     for task, title in TITLES.items():
         page.append(section(title, show("helpers", task, "--helper", "llm")))
-    page.append(section("Obstacle, told", show("helpers", "obstacle", "--helper", "llm-told")))
+    page.append(section("Obstacle, known task", show("helpers", "obstacle", "--helper", "llm_known_task")))
     page.append(section("A partner, low target", show("partner", "low_target", "--agent", "partner")))
     record = show("helpers", "moving_house", "--helper", "llm", "--brief")
     page.append(f"""

@@ -44,7 +44,7 @@ def chaic(seconds: float) -> float:
 
     worlds = 64
     env = HelperVectorEnv(
-        None, worlds, observation=("rgb", "depth", "own"), image_size=SIZE, partner_image_size=SIZE, autoreset_mode="SameStep"
+        None, worlds, observation=("rgb", "depth", "proprioception"), image_size=SIZE, partner_image_size=SIZE, autoreset_mode="SameStep"
     )
     env.reset(seed=0)
     rng = np.random.default_rng(0)

@@ -48,7 +48,7 @@ def overhead_us(decisions: int = 4000) -> tuple[float, float]:
     """Returns the microseconds of a short step with the Gymnasium interface and with the world alone.
 
     Both take turns on the same world. The value is the tenth percentile: in these steps only the helper acts."""
-    env = HelperEnv("low_target", observation="own", partner_image_size=16)
+    env = HelperEnv("low_target", observation="proprioception", partner_image_size=16)
     episode = {"episode": "low_target/train/00"}
     env.reset(seed=0, options=episode)
     world = env.world
@@ -75,8 +75,8 @@ def main() -> None:
     worlds, seconds = arguments.worlds, arguments.seconds
     print(f"chaic {chaic.__version__}, {worlds} worlds of all eight tasks, {seconds:g} s each")
     for name, options in [
-        ("color and depth, 128x128", {"observation": ("rgb", "depth", "own")}),
-        ("own state only", {"observation": "own"}),
+        ("color and depth, 128x128", {"observation": ("rgb", "depth", "proprioception")}),
+        ("own state only", {"observation": "proprioception"}),
     ]:
         for eyes, more in [("512", {}), ("128", {"partner_image_size": 128})]:
             rate = vector_rate(worlds, seconds, **options, **more)

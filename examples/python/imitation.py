@@ -42,7 +42,7 @@ def export(name: str, path: Path) -> None:
         assert observation.depth is not None
         step = 512 // SIZE
         depth.append(observation.depth[step // 2 :: step, step // 2 :: step].astype(np.float16))
-        own.append(world.own()[0])
+        own.append(world.proprioception()[0])
         kinds.append(kind_of(action))
         world.submit(action)
     np.savez_compressed(path, depth=depth, own=own, kind=kinds)
@@ -80,7 +80,7 @@ def main() -> None:
             export(name, path)
     played = [np.load(path) for path in files]
     depth, own, kind = (
-        torch.from_numpy(np.concatenate([p[part] for p in played])) for part in ("depth", "own", "kind")
+        torch.from_numpy(np.concatenate([p[part] for p in played])) for part in ("depth", "proprioception", "kind")
     )
     print(f"{len(kind)} decisions of {len(names)} episodes")
     model, n = Imitator(), len(kind)

@@ -40,14 +40,14 @@ class LanguageHelper:
 
     def act(self, observation: chaic.Observation) -> Any:
         """Returns the next action; asks for a new plan when the current one has ended."""
-        action = self.planner.attend(observation)
+        action = self.planner.act(observation)
         while action is None:
             action = self.planner.choose(self.ask(self.planner.plans()))
         return action
 
     def ask(self, plans: list[str]) -> int:
         """Returns the index of the model's plan, or 0 if its answer has no valid number."""
-        remembered = {thing["class"] for thing in self.planner.things() if thing["is_present"]}
+        remembered = {thing["class"] for thing in self.planner.remembered_objects() if thing["is_present"]}
         numbered = "\n".join(f"{k}: {plan}" for k, plan in enumerate(plans))
         prompt = PROMPT.format(objects=", ".join(sorted(remembered)) or "nothing", plans=numbered)
         body = {"model": self.model, "messages": [{"role": "user", "content": prompt}], "temperature": 0}

@@ -66,7 +66,7 @@ def main() -> None:
     arguments = parser.parse_args()
     torch.manual_seed(0)
     flat = Flat(
-        gymnasium.make(f"chaic/{arguments.task}-v0", observation="own", action="plan", partner_image_size=128)
+        gymnasium.make(f"chaic/{arguments.task}-v0", observation="proprioception", action="plan", partner_image_size=128)
     )
     size = flat.observation_space["observation"].shape[0]  # type: ignore[index]
     n = int(flat.env.action_space.n)  # type: ignore[attr-defined]

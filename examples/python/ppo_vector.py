@@ -55,7 +55,7 @@ def main() -> None:
         "chaic/All-v0",
         num_envs=ENVS,
         vectorization_mode="vector_entry_point",
-        observation="own",
+        observation="proprioception",
         image_size=size,
         partner_image_size=128,
         autoreset_mode="SameStep",
@@ -67,10 +67,10 @@ def main() -> None:
     began, decisions, scores = time.perf_counter(), 0, [0.0]
     while decisions < arguments.steps:
         batch: dict[str, list[torch.Tensor]] = {
-            name: [] for name in ("own", "mask", "action", "log_prob", "value", "reward", "discount")
+            name: [] for name in ("proprioception", "mask", "action", "log_prob", "value", "reward", "discount")
         }
         for _ in range(ROLLOUT):
-            own = torch.from_numpy(observation["own"])
+            own = torch.from_numpy(observation["proprioception"])
             mask = torch.from_numpy(infos["kind_mask"]).bool()
             with torch.no_grad():
                 heads, value = policy(own, mask)
@@ -84,7 +84,7 @@ def main() -> None:
             # Decisions differ in duration, so the discount is per frame.
             discount = np.where(ended, 0.0, GAMMA_PER_FRAME ** infos["frames"])
             for name, values in [
-                ("own", own),
+                ("proprioception", own),
                 ("mask", mask),
                 ("action", action),
                 ("log_prob", log_prob(heads, action)),
@@ -95,7 +95,7 @@ def main() -> None:
                 batch[name].append(values)
             decisions += ENVS
         with torch.no_grad():
-            own = torch.from_numpy(observation["own"])
+            own = torch.from_numpy(observation["proprioception"])
             _, value = policy(own, torch.from_numpy(infos["kind_mask"]).bool())
         advantages, advantage = [], torch.zeros(ENVS)
         for k in reversed(range(ROLLOUT)):
@@ -108,7 +108,7 @@ def main() -> None:
         returns = gained + data["value"]
         for _ in range(EPOCHS):
             for part in torch.randperm(len(gained)).chunk(MINIBATCHES):
-                heads, value = policy(data["own"][part], data["mask"][part])
+                heads, value = policy(data["proprioception"][part], data["mask"][part])
                 ratio = (log_prob(heads, data["action"][part]) - data["log_prob"][part]).exp()
                 a = gained[part]
                 a = (a - a.mean()) / (a.std() + 1e-8)

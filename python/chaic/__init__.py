@@ -14,7 +14,7 @@ from chaic import _chaic, _deprecated
 from chaic._chaic import (
     ACTIONS,
     MAP,
-    PLAN,
+    PLAN_FEATURES,
     PROPRIOCEPTION,
     REWARD,
     Batch,
@@ -40,7 +40,7 @@ from chaic.runs import Helper, Run, evaluate, merge, play
 __all__ = [
     "ACTIONS",
     "MAP",
-    "PLAN",
+    "PLAN_FEATURES",
     "PROPRIOCEPTION",
     "REWARD",
     "Batch",
@@ -68,7 +68,7 @@ __all__ = [
     "tasks",
 ]
 
-_RENAMED = {"OWN": "PROPRIOCEPTION", "Mind": "PlanningAgent"}
+_RENAMED = {"OWN": "PROPRIOCEPTION", "PLAN": "PLAN_FEATURES", "Mind": "PlanningAgent"}
 
 
 def __getattr__(name: str) -> Any:

@@ -11,7 +11,7 @@ from typing_extensions import Self
 __version__: str
 ACTIONS: list[str]
 PROPRIOCEPTION: list[str]
-PLAN: list[str]
+PLAN_FEATURES: list[str]
 MAP: list[str]
 REWARD: dict[str, float]
 
@@ -39,7 +39,7 @@ class Episode:
     @property
     def task(self) -> str:
         """Task name."""
-    def plan(self, width: int = 640) -> NDArray[np.uint8]:
+    def floor_plan(self, width: int = 640) -> NDArray[np.uint8]:
         """Draws the top view, uint8 [height, width, 3]."""
     def show(self) -> None:
         """Shows the top view in the notebook or the browser."""
@@ -161,14 +161,15 @@ class World:
         agent needs an action, and the reward terms: delivered fraction, meters of progress, and whether it failed."""
     def progress(self) -> tuple[float, float]:
         """Returns the delivered and the wanted amount; TR is their ratio."""
-    def own(self, agent: int = 1) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    def proprioception(self, agent: int = 1) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
         """Returns the proprioception (`PROPRIOCEPTION`) of an agent that needs an action, and the mask of `ACTIONS` that
         its hands allow."""
     def reward(self, agent: int = 1) -> dict[str, Any] | None:
         """Returns the reward terms of the last action of an agent: `delivered`, `progress_m`, `is_invalid`; `None` before
         the first one."""
     def score(self) -> dict[str, Any]:
-        """Returns the score so far: `frame`, `done`, `total`, `complete`; TR is `done / total`."""
+        """Returns the score so far: `frame`, `delivered`, `wanted`, `complete`; TR is
+        `delivered / wanted`."""
     def take_events(self) -> list[dict[str, Any]]:
         """Returns the events since the last call (docs/reference/trace.md)."""
     def digest(self) -> str:
@@ -184,9 +185,9 @@ class World:
         image_size: int = 512,
         images: Sequence[str] | None = None,
     ) -> dict[str, NDArray[Any]]:
-        """Renders the view of an agent or a camera (a dictionary as `Observation.camera`). Returns arrays by name: `rgb`,
-        `depth`, `ids`. The method ignores grants; agents use `observe`."""
-    def plan(self, width: int = 640) -> NDArray[np.uint8]:
+        """Renders the view of an agent, by default the helper, or of a camera (a dictionary as `Observation.camera`).
+        Returns arrays by name: `rgb`, `depth`, `ids`. The method ignores grants; agents use `observe`."""
+    def floor_plan(self, width: int = 640) -> NDArray[np.uint8]:
         """Draws the top view, uint8 [height, width, 3]."""
     def show(self) -> None:
         """Shows the top view in the notebook or the browser."""
@@ -242,7 +243,7 @@ class Batch:
         """Renders the requested images of all slots that need an action into arrays: color (uint8 [slots, size, size,
         3]), depth (float32 meters [slots, size, size]) and ids (uint16 [slots, size, size]). Returns these slots;
         the arrays of other slots do not change."""
-    def own(self, values: NDArray[np.float32], mask: NDArray[np.bool_]) -> None:
+    def proprioception(self, values: NDArray[np.float32], mask: NDArray[np.bool_]) -> None:
         """Writes proprioception (`PROPRIOCEPTION`, float32 [slots, 12]) and the mask of `ACTIONS` that the hands allow
         (bool [slots, 11]) of all observed slots."""
     def submit(self, actions: NDArray[np.int64]) -> None:
@@ -265,7 +266,15 @@ class Batch:
 @final
 class PlanningAgent:
     """Built-in helper that Python code asks for actions."""
-    def __new__(cls, name: str, perception: str = "gt", behavior: str = "gt") -> Self: ...
+    def __new__(
+        cls,
+        name: str,
+        perception: str = "gt",
+        behavior: str = "gt",
+        *,
+        rules: str = "paper",
+        set: Sequence[str] = ...,
+    ) -> Self: ...
     @property
     def grants(self) -> list[str]:
         """Required grants."""
@@ -282,7 +291,13 @@ class PlanningAgent:
 class Planner:
     """Perception, memory and execution of the built-in helpers; the caller chooses the plans."""
     def __new__(
-        cls, perception: str = "gt", image_size: int = 512, behavior: str = "gt"
+        cls,
+        perception: str = "gt",
+        image_size: int = 512,
+        behavior: str = "gt",
+        *,
+        rules: str = "paper",
+        set: Sequence[str] = ...,
     ) -> Self: ...
     @property
     def grants(self) -> list[str]:
@@ -292,21 +307,21 @@ class Planner:
         """Required images."""
     def reset(self, briefing: Briefing) -> None:
         """Starts an episode."""
-    def attend(self, observation: Observation) -> _Action | None:
+    def act(self, observation: Observation) -> _Action | None:
         """Processes an observation; returns the next action of the current plan, or `None` if the caller must choose a
         plan (`plans`, `choose`)."""
-    def look(self, observation: Observation) -> None:
+    def observe(self, observation: Observation) -> None:
         """Updates the memory from an observation, without a decision."""
     def plans(self) -> list[str]:
         """Returns the valid plans as text, those of one kind by distance; empty while a plan is executed."""
-    def plan_numbers(self) -> NDArray[np.float32]:
-        """Returns the valid plans as vectors (`PLAN`), float32 [plans, 14]."""
+    def plan_features(self) -> NDArray[np.float32]:
+        """Returns the valid plans as vectors (`PLAN_FEATURES`), float32 [plans, 14]."""
     def semantic_map(self, side: int = 64, cell_m: float = 0.25) -> NDArray[np.uint8]:
         """Draws the memory as an egocentric top view, heading up: uint8 [channels, side, side], with the channels of
         `MAP`."""
     def choose(self, index: int) -> _Action | None:
         """Chooses a plan; returns its first action, or `None` if it can't be executed and another must be chosen."""
-    def things(self) -> list[dict[str, Any]]:
+    def remembered_objects(self) -> list[dict[str, Any]]:
         """Returns the remembered objects: `name`, `class`, `position` in the world (meters), `last_seen` (frame), and
         `is_present` by current knowledge."""
 
@@ -361,4 +376,4 @@ def evaluate(
 def serve(maker: Callable[[], Any], images: Sequence[str], image_size: int, output: int) -> None:
     """Serves helpers that `maker` creates on standard input and the descriptor `output`, until the input is closed."""
 def merge(out: str | PathLike[str], runs: Sequence[str | PathLike[str]]) -> str:
-    """Merges the shards of a run in a new folder; returns the report."""
+    """Merges the shards of a run in a new folder; returns the report. Warns if episode runs are missing."""

@@ -46,8 +46,8 @@ class HelperEnv(gymnasium.Env[Any, Any]):
     """Environment of one helper and the simulated partner of a task.
 
     - ``task``: a task, several, or ``None`` for the paper's eight.
-    - ``observation``: any of ``rgb`` (uint8), ``depth`` (float32 metres), ``own`` (proprioception,
-      ``chaic.PROPRIOCEPTION``), ``map`` (egocentric map of the memory, ``chaic.MAP``), and ``ids`` (needs the grant).
+    - ``observation``: any of ``rgb`` (uint8), ``depth`` (float32 metres), ``proprioception``
+      (``chaic.PROPRIOCEPTION``), ``map`` (egocentric map of the memory, ``chaic.MAP``), and ``ids`` (needs the grant).
     - ``action``: ``"primitive"`` is a kind of action and a pixel. ``"plan"`` is the index of an offered plan
       (``observation["plans"]``, ``info["action_mask"]``), which chaic's planner executes.
     - ``perception`` of planner and map: ``"gt"``, which adds the grant ``ids``, or ``"learned"``.
@@ -91,7 +91,7 @@ class HelperEnv(gymnasium.Env[Any, Any]):
         images = spaces.image_parts(self.parts)
         self._planner: Planner | None = None
         if self._uses_plans or "map" in self.parts:
-            self._planner = Planner(perception, image_size)
+            self._planner = Planner(perception, image_size, rules=rules, set=list(set))
             images = sorted({*images, *self._planner.images})
             grants = sorted({*grants, *self._planner.grants})
         #: Grants of the helper (docs/grants.md).
@@ -160,8 +160,8 @@ class HelperEnv(gymnasium.Env[Any, Any]):
             reward = self._act(spaces.parse_row(action, self._bounds))
         if self.render_mode == "human":
             self.render()
-        done, total = world.progress()
-        complete = done >= total
+        delivered, wanted = world.progress()
+        complete = delivered >= wanted
         ended = not self._needs_action
         info = self._info(world.frame - before)
         return self._observe(), reward, ended and complete, ended and not complete, info
@@ -201,21 +201,21 @@ class HelperEnv(gymnasium.Env[Any, Any]):
         assert self.world is not None
         observation = self.world.observe(HELPER)
         if self._uses_plans:
-            self._next_action = self._planner.attend(observation)
+            self._next_action = self._planner.act(observation)
         else:
-            self._planner.look(observation)
+            self._planner.observe(observation)
 
     def _observe(self) -> Obs:
         world = self.world
         assert world is not None
         if not self._needs_action:
             return {part: array.copy() for part, array in self._last.items()}
-        own, self._kind_mask = world.own(HELPER)
+        proprioception, self._kind_mask = world.proprioception(HELPER)
         observation = world.observe(HELPER) if self._has_images else None
         out: Obs = {}
         for part in self.parts:
-            if part == "own":
-                out["own"] = own
+            if part == "proprioception":
+                out["proprioception"] = proprioception
             elif part == "map":
                 assert self._planner is not None
                 out["map"] = self._planner.semantic_map(spaces.MAP_SIDE, spaces.MAP_CELL_M)
@@ -223,7 +223,7 @@ class HelperEnv(gymnasium.Env[Any, Any]):
                 out[part] = getattr(observation, part)
         if self._uses_plans:
             assert self._planner is not None
-            vectors = self._planner.plan_numbers()[: spaces.MAX_PLANS]
+            vectors = self._planner.plan_features()[: spaces.MAX_PLANS]
             plans = np.zeros((spaces.MAX_PLANS, vectors.shape[1]), np.float32)
             plans[: len(vectors)] = vectors
             out["plans"] = plans
@@ -248,14 +248,14 @@ class HelperEnv(gymnasium.Env[Any, Any]):
     def _info(self, frames: int) -> Info:
         world = self.world
         assert world is not None
-        done, total = world.progress()
+        delivered, wanted = world.progress()
         self._events = world.take_events()
         return {
             "frames": frames,
             "frame": world.frame,
             "events": self._events,
             "action_mask": self._mask(),
-            "tr": done / total if total else 0.0,
+            "tr": delivered / wanted if wanted else 0.0,
             "episode_id": self._episode_id,
         }
 
@@ -277,7 +277,7 @@ class HelperEnv(gymnasium.Env[Any, Any]):
         score = world.score()
         lines = [
             f"{world.episode.id}: frame {world.frame} of {world.horizon}, "
-            f"{score['done']:g} of {score['total']:g} delivered"
+            f"{score['delivered']:g} of {score['wanted']:g} delivered"
         ]
         lines += [", ".join(f"{k} {v}" for k, v in event.items()) for event in self._events]
         return "\n".join(lines)

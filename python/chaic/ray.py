@@ -67,13 +67,20 @@ def evaluate(
     if baselines:
         options["baselines"] = tuple(baselines)
     _deprecated.rename_keys(options, RENAMED_OPTIONS)
+    options.pop("quiet", None)
+    if Path(out).exists() and any(Path(out).iterdir()):
+        raise ValueError(f"{out} is not empty; choose another folder")
     ray: Any = importlib.import_module("ray")
     if not ray.is_initialized():
         ray.init()
+    parts = Path(f"{out}.shards")
+    if shards is None:
+        # After an interruption the cluster can have another size.
+        earlier = {int(folder.name.split("-of-")[1]) for folder in parts.glob("*-of-*[0-9]")}
+        shards = earlier.pop() if len(earlier) == 1 else None
     if shards is None:
         cores = int(ray.cluster_resources().get("CPU", 1))
         shards = max(1, 4 * cores // jobs)
-    parts = Path(f"{out}.shards")
     parts.mkdir(parents=True, exist_ok=True)
     remote = ray.remote(num_cpus=jobs, max_retries=0)(_play)
     remaining_tries = {k: tries for k in range(1, shards + 1) if not (parts / f"{k}-of-{shards}").is_dir()}
@@ -87,6 +94,9 @@ def evaluate(
             try:
                 data = ray.get(reference)
             except (ray.exceptions.RayError, OSError) as error:
+                # Another try of a call with wrong arguments fails as well.
+                if isinstance(error, (ValueError, TypeError)):
+                    raise
                 remaining_tries[k] -= 1
                 if remaining_tries[k] == 0:
                     for other in pending:

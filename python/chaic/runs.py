@@ -255,9 +255,9 @@ class Run:
             ("task", "U32"),
             ("episode", "U128"),
             ("seed", np.int64),
-            ("broke_down", np.bool_),
-            ("done", np.float64),
-            ("total", np.float64),
+            ("failed", np.bool_),
+            ("delivered", np.float64),
+            ("wanted", np.float64),
             ("tr", np.float64),
             ("frames", np.int64),
         ]
@@ -280,8 +280,10 @@ class Run:
         path = self.path / "results.jsonl"
         if not path.exists():
             return []
-        lines = [json.loads(line) for line in path.read_text().splitlines() if line]
-        by_key = {(line["helper"], line["episode"], line.get("seed", 0)): line for line in lines}
+        # Messages in the lines may contain other line separators. The last line of a killed run can be incomplete.
+        *lines, _ = path.read_text(encoding="utf-8").split("\n")
+        results = [json.loads(line) for line in lines if line]
+        by_key = {(r["helper"], r["task"], r["episode"], r.get("seed", 0)): r for r in results}
         return [by_key[key] for key in sorted(by_key)]
 
     def records(self) -> NDArray[Any]:
@@ -289,22 +291,22 @@ class Run:
         results = self.results()
         records = np.zeros(len(results), self.DTYPE)
         for record, result in zip(records, results, strict=True):
-            done, total = result.get("done", 0.0), result.get("total", 0.0)
+            delivered, wanted = result.get("done", 0.0), result.get("total", 0.0)
             for name, value in [
                 ("helper", result["helper"]),
-                ("task", result["episode"].split("/")[0]),
+                ("task", result["task"]),
                 ("episode", result["episode"]),
                 ("seed", result.get("seed", 0)),
-                ("broke_down", "done" not in result),
-                ("done", done),
-                ("total", total),
-                ("tr", done / total if total else 0.0),
+                ("failed", "done" not in result),
+                ("delivered", delivered),
+                ("wanted", wanted),
+                ("tr", delivered / wanted if wanted else 0.0),
                 ("frames", result.get("frames", 0)),
             ]:
                 record[name] = value
         return records
 
-    def frame(self) -> Any:
+    def to_dataframe(self) -> Any:
         """Returns the records as a pandas DataFrame."""
         import pandas
 

@@ -10,19 +10,20 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from chaic._chaic import ACTIONS, MAP, PLAN, PROPRIOCEPTION, classes
+from chaic._chaic import ACTIONS, MAP, PLAN_FEATURES, PROPRIOCEPTION, classes
 
 #: Parts of an observation.
-PARTS = ("rgb", "depth", "ids", "own", "map")
+PARTS = ("rgb", "depth", "ids", "proprioception", "map")
 #: Default parts.
-DEFAULT_PARTS = ("rgb", "depth", "own")
+DEFAULT_PARTS = ("rgb", "depth", "proprioception")
 
 #: Maximum depth, metres; also the depth of a pixel without a surface.
 MAX_DEPTH_M = 100.0
 #: Bound of positions relative to the origin of the world or to a body, metres.
 MAX_COORDINATE_M = 1000.0
-#: Maximum number of offered plans; further ones are dropped, the farthest first.
-MAX_PLANS = 32
+#: Maximum number of offered plans; further ones are dropped. Those of the standard split are at most 52: a target for each of
+#: 33 objects, six containers, seven obstacles, and six plans without an object.
+MAX_PLANS = 64
 #: Semantic map: cells along each side, and the size of a cell, metres.
 MAP_SIDE = 64
 MAP_CELL_M = 0.25
@@ -55,11 +56,11 @@ def proprioception_space() -> spaces.Box:
 
 
 def plan_vectors_space() -> spaces.Box:
-    """Returns the space of the vectors of offered plans (``chaic.PLAN``); unused rows are zero."""
+    """Returns the space of the vectors of offered plans (``chaic.PLAN_FEATURES``); unused rows are zero."""
     high_of = {"class": float(n_classes()), "right_m": MAX_COORDINATE_M, "ahead_m": MAX_COORDINATE_M}
     low_of = {"class": -1.0, "right_m": -MAX_COORDINATE_M, "ahead_m": -MAX_COORDINATE_M}
-    high = np.array([high_of.get(name, 1.0) for name in PLAN], np.float32)
-    low = np.array([low_of.get(name, 0.0) for name in PLAN], np.float32)
+    high = np.array([high_of.get(name, 1.0) for name in PLAN_FEATURES], np.float32)
+    low = np.array([low_of.get(name, 0.0) for name in PLAN_FEATURES], np.float32)
     shape = (MAX_PLANS, 1)
     return spaces.Box(np.tile(low, shape), np.tile(high, shape), dtype=np.float32)
 
@@ -73,7 +74,7 @@ def observation_space(
         "rgb": spaces.Box(0, 255, (size, size, 3), np.uint8),
         "depth": spaces.Box(0.0, MAX_DEPTH_M, (size, size), np.float32),
         "ids": spaces.Box(0, 2**16 - 1, (size, size), np.uint16),
-        "own": proprioception_space(),
+        "proprioception": proprioception_space(),
         "map": spaces.Box(0, 1, (len(MAP), MAP_SIDE, MAP_SIDE), np.uint8),
     }
     chosen = {part: by_part[part] for part in parts}

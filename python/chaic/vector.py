@@ -19,7 +19,7 @@ from chaic.gym import reward_weights
 Arrays = dict[str, NDArray[Any]]
 
 #: Parts of an observation that a vector environment supports.
-PARTS = ("rgb", "depth", "ids", "own")
+PARTS = ("rgb", "depth", "ids", "proprioception")
 
 
 class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
@@ -110,7 +110,7 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
             if part not in arrays:
                 raise ValueError(f"the observation has no part {part!r}")
         # The batch writes proprioception together with the action mask, even if it is not part of the observation.
-        self._proprioception = arrays.get("own", np.zeros((self.num_envs, len(PROPRIOCEPTION)), np.float32))
+        self._proprioception = arrays.get("proprioception", np.zeros((self.num_envs, len(PROPRIOCEPTION)), np.float32))
         return arrays
 
     def reset(
@@ -180,15 +180,15 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
 
     def _observe(self) -> Arrays:
         assert self.batch is not None
-        self.batch.own(self._proprioception, self._mask)
+        self.batch.proprioception(self._proprioception, self._mask)
         if self.copy:
             return {part: array.copy() for part, array in self._arrays.items()}
         return dict(self._arrays)
 
     def _infos(self, frames: NDArray[np.int64]) -> dict[str, Any]:
         assert self.batch is not None
-        done, total = self.batch.progress().T
-        tr = np.divide(done, total, out=np.zeros_like(done), where=total > 0)
+        delivered, wanted = self.batch.progress().T
+        tr = np.divide(delivered, wanted, out=np.zeros_like(delivered), where=wanted > 0)
         all_worlds = np.ones(self.num_envs, bool)
         infos: dict[str, Any] = {
             "frames": frames,
@@ -224,8 +224,8 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
         frames = self.batch.frames().astype(np.int64) - before
         rewards = self.batch.rewards(self.weights)
         ended = self._ended & ~ended_before if next_step else self._ended.copy()
-        done, total = self.batch.progress().T
-        terminations = ended & (done >= total)
+        delivered, wanted = self.batch.progress().T
+        terminations = ended & (delivered >= wanted)
         truncations = ended & ~terminations
         if next_step:
             rewards[ended_before] = 0.0
@@ -282,6 +282,11 @@ def _as_array(target: Any) -> NDArray[Any]:
     """Returns an array that shares the memory of ``target``."""
     if isinstance(target, np.ndarray):
         return target
+    if hasattr(target, "__array__"):
+        arrays = np.asarray(target), np.asarray(target)
+        # Equal addresses mean that no copy was made. An array of NumPy's DLPack can be read-only.
+        if arrays[0].ctypes.data == arrays[1].ctypes.data:
+            return arrays[0]
     if hasattr(target, "__dlpack__"):
         return np.from_dlpack(target)
     return np.asarray(memoryview(target))

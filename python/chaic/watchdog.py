@@ -13,6 +13,12 @@ from chaic._chaic import Briefing, Observation
 
 #: Interval of the checks, seconds.
 _INTERVAL_S = 0.1
+#: Interval between the exceptions of a call that catches them, seconds.
+_REPEAT_S = 1.0
+
+
+class _TimeLimitExceeded(BaseException):
+    """Raised in a call that exceeds its time limit. Handlers of ``Exception`` do not catch it."""
 
 
 def _raise_in(thread: int, error: type[BaseException] | None) -> None:
@@ -22,7 +28,7 @@ def _raise_in(thread: int, error: type[BaseException] | None) -> None:
 
 
 class Watchdog:
-    """Raises ``TimeoutError`` in threads that exceed the time limit inside ``limit``.
+    """Ends calls that exceed the time limit inside ``limit``, which then raises ``TimeoutError``.
 
     Python code can be stopped anywhere, a call into C (a sleep, a download, a matrix product) only when it returns.
     """
@@ -32,6 +38,8 @@ class Watchdog:
             raise ValueError(f"limit_s is {limit_s}, expected more than 0 seconds")
         self._limit_s = limit_s
         self._deadlines: dict[int, float] = {}
+        #: Threads whose current call has exceeded the limit.
+        self._expired: set[int] = set()
         self._lock = threading.Lock()
         self._done = threading.Event()
 
@@ -47,26 +55,42 @@ class Watchdog:
             now = time.monotonic()
             with self._lock:
                 for thread in [thread for thread, deadline in self._deadlines.items() if now > deadline]:
-                    del self._deadlines[thread]
-                    _raise_in(thread, TimeoutError)
+                    self._deadlines[thread] = now + _REPEAT_S
+                    self._expired.add(thread)
+                    _raise_in(thread, _TimeLimitExceeded)
 
     @contextmanager
     def limit(self, call: str) -> Generator[None]:
         """Applies the time limit to this thread inside the context; ``call`` names the call in the error."""
         thread = threading.get_ident()
         with self._lock:
+            self._expired.discard(thread)
             self._deadlines[thread] = time.monotonic() + self._limit_s
+        error: BaseException | None = None
         try:
             yield
-        except TimeoutError as error:
-            if not error.args:
-                error.args = (f"{call} took longer than {self._limit_s:g} s",)
-            raise
-        finally:
-            with self._lock:
-                if self._deadlines.pop(thread, None) is None:
-                    # The exception may still be pending although the call has returned.
-                    _raise_in(thread, None)
+        except BaseException as raised:
+            error = raised
+        # The exception may come anywhere until the deadline is gone.
+        try:
+            is_expired = self._end(thread)
+        except _TimeLimitExceeded:
+            is_expired = self._end(thread)
+        if is_expired:
+            raise TimeoutError(f"{call} took longer than {self._limit_s:g} s") from error
+        if error is not None:
+            raise error
+
+    def _end(self, thread: int) -> bool:
+        """Ends the current call of a thread; returns whether it has exceeded the limit."""
+        with self._lock:
+            is_expired = thread in self._expired
+            self._deadlines.pop(thread, None)
+            self._expired.discard(thread)
+            if is_expired:
+                # The exception may still be pending although the call has returned.
+                _raise_in(thread, None)
+            return is_expired
 
 
 class TimeLimitedHelper:

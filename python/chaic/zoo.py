@@ -24,6 +24,11 @@ from chaic.gym import PICTURE_SIZE, Obs, reward_weights
 AGENTS: tuple[str, ...] = ("partner", "helper")
 
 
+def _copy(observation: Obs) -> Obs:
+    """Returns a copy, which the caller may change."""
+    return {part: array.copy() for part, array in observation.items()}
+
+
 class _Info(dict[str, Any]):
     """Info of an agent; accepts the deprecated key ``asked``."""
 
@@ -86,7 +91,7 @@ class _Pair:
     def observe(self, agent: int) -> Obs:
         observation = self.world.observe(agent)
         return {
-            part: self.world.own(agent)[0] if part == "own" else getattr(observation, part)
+            part: self.world.proprioception(agent)[0] if part == "proprioception" else getattr(observation, part)
             for part in self.parts
         }
 
@@ -108,12 +113,12 @@ class _Pair:
     def info(self, agent: int, needs_action: bool) -> dict[str, Any]:
         world = self.world
         score = world.score()
-        kinds: NDArray[Any] = world.own(agent)[1] if needs_action else np.zeros(len(ACTIONS), bool)
+        kinds: NDArray[Any] = world.proprioception(agent)[1] if needs_action else np.zeros(len(ACTIONS), bool)
         return _Info(
             needs_action=int(needs_action),
             frame=world.frame,
             action_mask=spaces.primitive_mask(kinds, self.image_size),
-            tr=score["done"] / score["total"] if score["total"] else 0.0,
+            tr=score["delivered"] / score["wanted"] if score["wanted"] else 0.0,
             episode_id=world.episode.id,
         )
 
@@ -241,7 +246,7 @@ class PairEnv(_PairBase, AECEnv[str, Obs, Any]):
 
     def observe(self, agent: str) -> Obs:
         """Returns the observation of an agent when it last needed an action."""
-        return dict(self._last[agent])
+        return _copy(self._last[agent])
 
     def step(self, action: Any) -> None:
         """Submits the action of the selected agent; ``None`` for an agent that has ended."""
@@ -279,7 +284,7 @@ class PairParallelEnv(_PairBase, ParallelEnv[str, Obs, Any]):
         self._last = {agent: self._pair.zero_observation() for agent in AGENTS}
         self._steps = 0
         waiting = self._advance()
-        return dict(self._last), self._infos(waiting)
+        return self._observations(), self._infos(waiting)
 
     def _advance(self) -> list[int]:
         """Advances, observes for the agents that need an action, and returns their ids; none at the end."""
@@ -287,6 +292,9 @@ class PairParallelEnv(_PairBase, ParallelEnv[str, Obs, Any]):
         for agent_id in waiting:
             self._last[AGENTS[agent_id]] = self._pair.observe(agent_id)
         return waiting
+
+    def _observations(self) -> dict[str, Obs]:
+        return {agent: _copy(observation) for agent, observation in self._last.items()}
 
     def _infos(self, waiting: Sequence[int]) -> dict[str, Any]:
         return {a: self._pair.info(k, k in waiting) for k, a in enumerate(AGENTS)}
@@ -306,14 +314,15 @@ class PairParallelEnv(_PairBase, ParallelEnv[str, Obs, Any]):
         ended = not waiting
         complete = bool(self.world.score()["complete"])
         is_cut = self.max_cycles is not None and self._steps >= self.max_cycles
-        rewarded = range(len(AGENTS)) if ended else waiting
+        # The last step pays what a running action has earned so far.
+        rewarded = range(len(AGENTS)) if ended or is_cut else waiting
         rewards = dict.fromkeys(AGENTS, 0.0)
         rewards |= {AGENTS[agent_id]: self._pair.reward(agent_id) for agent_id in rewarded}
         terminations = dict.fromkeys(AGENTS, ended and complete)
         truncations = dict.fromkeys(AGENTS, not (ended and complete) and (ended or is_cut))
         if ended or is_cut:
             self.agents = []
-        return dict(self._last), rewards, terminations, truncations, self._infos(waiting)
+        return self._observations(), rewards, terminations, truncations, self._infos(waiting)
 
 
 def env(task: str | Sequence[str] | None = None, **options: Any) -> PairEnv:

@@ -17,7 +17,7 @@ def resident_mib() -> float:
 
 
 def test_memory_does_not_grow_over_resets():
-    env = HelperEnv(None, observation=("rgb", "own"), image_size=32, partner_image_size=32)
+    env = HelperEnv(None, observation=("rgb", "proprioception"), image_size=32, partner_image_size=32)
     rng = np.random.default_rng(0)
     before = 0.0
     for k in range(RESETS):

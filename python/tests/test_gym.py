@@ -30,9 +30,9 @@ def test_the_gymnasium_checker_passes(name):
 @pytest.mark.parametrize(
     "options",
     [
-        {"observation": "own"},
-        {"observation": ("rgb", "depth", "ids", "own", "map"), "grants": ["ids"]},
-        {"action": "plan", "observation": ("own", "map")},
+        {"observation": "proprioception"},
+        {"observation": ("rgb", "depth", "ids", "proprioception", "map"), "grants": ["ids"]},
+        {"action": "plan", "observation": ("proprioception", "map")},
         {"action": "plan", "perception": "learned", "image_size": 64},
     ],
 )
@@ -42,7 +42,7 @@ def test_the_gymnasium_checker_passes_for_other_observations(options):
 
 
 def test_an_episode_of_plans_ends_at_the_horizon_or_when_complete():
-    env = gymnasium.make(IDS["no_constraint"], action="plan", observation="own")
+    env = gymnasium.make(IDS["no_constraint"], action="plan", observation="proprioception")
     _, info = env.reset(seed=3)
     ended, frames, reward = False, 0, 0.0
     while not ended:
@@ -81,9 +81,9 @@ def test_old_names_of_options_warn():
         weights = reward_weights({"approached_per_m": 2.0})
     assert weights == chaic.REWARD | {"progress_per_m": 2.0}
     with pytest.warns(DeprecationWarning, match="partner_image_size"):
-        HelperEnv("obstacle", observation="own", minds_image_size=32)
+        HelperEnv("obstacle", observation="proprioception", minds_image_size=32)
     with pytest.warns(DeprecationWarning, match="partner_image_size"):
-        HelperVectorEnv("obstacle", observation="own", minds_image_size=32)
+        HelperVectorEnv("obstacle", observation="proprioception", minds_image_size=32)
     with pytest.raises(TypeError, match="partner_image_size"):
         HelperEnv("obstacle", partner_image_size=32, minds_image_size=32)
 
@@ -121,7 +121,7 @@ def test_a_world_in_a_vector_equals_a_single_world():
 
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
 def test_episodes_restart_in_each_autoreset_mode(mode):
-    vector = make(2, autoreset_mode=mode, observation="own")
+    vector = make(2, autoreset_mode=mode, observation="proprioception")
     vector.reset(seed=1)
     # Waits reach the horizon in the fewest steps.
     wait = np.tile([chaic.ACTIONS.index("wait"), 0, 0], (2, 1))
@@ -149,8 +149,8 @@ def test_episodes_restart_in_each_autoreset_mode(mode):
 
 
 def test_a_vector_writes_into_the_given_arrays():
-    out = {"rgb": np.zeros((2, 32, 32, 3), np.uint8), "own": np.zeros((2, 12), np.float32)}
-    vector = make(2, observation=("rgb", "own"), out=out)
+    out = {"rgb": np.zeros((2, 32, 32, 3), np.uint8), "proprioception": np.zeros((2, 12), np.float32)}
+    vector = make(2, observation=("rgb", "proprioception"), out=out)
     observation, _ = vector.reset(seed=0)
     assert np.shares_memory(observation["rgb"], out["rgb"]) and out["rgb"].max() > 0
     with pytest.raises(ValueError, match="expected"):
@@ -215,11 +215,11 @@ def test_environments_run_in_separate_processes():
 def test_a_vector_returns_new_arrays_unless_it_writes_into_given_ones():
     wait = np.tile([chaic.ACTIONS.index("turn_left"), 0, 0], (2, 1))
     for options, is_kept in [({}, True), ({"copy": False}, False)]:
-        vector = make(2, observation="own", **options)
+        vector = make(2, observation="proprioception", **options)
         first, _ = vector.reset(seed=0)
-        before = first["own"].copy()
+        before = first["proprioception"].copy()
         vector.step(wait)
-        assert (first["own"] == before).all() == is_kept
+        assert (first["proprioception"] == before).all() == is_kept
     with pytest.raises(ValueError, match="reset_mask"):
         vector.reset(options={"episode": "obstacle/train/00"})
 
@@ -237,3 +237,17 @@ def test_a_caller_may_change_what_it_gets():
         observation, _, terminated, truncated, info = env.step(first)
         ended = terminated or truncated
     assert env.observation_space.contains(observation)
+
+
+def test_actions_refer_to_pixels_without_images_as_well():
+    digests = []
+    for observation in (("depth", "proprioception"), ("proprioception",)):
+        env = gymnasium.make("chaic/LowTarget-v0", observation=observation, image_size=32, disable_env_checker=True)
+        env.reset(seed=5)
+        rng = np.random.default_rng(5)
+        for _ in range(40):
+            pick_up = chaic.ACTIONS.index("pick_up_left")
+            kind = [0, 0, 1, 2, pick_up, pick_up][rng.integers(6)]
+            env.step(np.array([kind, *rng.integers(32, size=2)]))
+        digests.append(env.unwrapped.world.digest())
+    assert digests[0] == digests[1]

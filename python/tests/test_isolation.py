@@ -95,7 +95,7 @@ def test_isolated_helpers_act_like_helpers_in_process(tmp_path, helpers):
 def test_helper_arguments_reach_the_process(tmp_path, helpers):
     maker = {"waiter": partial(helpers.Waiter, 50)}
     run = chaic.evaluate(maker, isolate=True, out=tmp_path / "run", **OPTIONS)
-    assert not run.records()["broke_down"].any()
+    assert not run.records()["failed"].any()
 
 
 def test_an_isolated_helper_cannot_read_caller_or_home(tmp_path, helpers, monkeypatch):
@@ -115,7 +115,7 @@ def test_an_isolated_helper_cannot_read_caller_or_home(tmp_path, helpers, monkey
 def test_a_process_serves_several_episodes(tmp_path, helpers):
     two = {**OPTIONS, "n_episodes": 2, "jobs": 1}
     run = chaic.evaluate(helpers.Counter, isolate=True, out=tmp_path / "run", **two)
-    broken = run.records()["broke_down"]
+    broken = run.records()["failed"]
     assert broken.sum() == 1
     assert "served 2" in json.dumps(run.results())
 

@@ -42,4 +42,4 @@ def test_the_code_runs_and_its_helper_beats_no_helper(page, n_blocks, tmp_path, 
     assert isinstance(run, chaic.Run)
     tr = mean_tr(run)
     assert tr["carrier"] > tr["none"] + 0.1, tr
-    assert not run.records()["broke_down"].any()
+    assert not run.records()["failed"].any()

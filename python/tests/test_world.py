@@ -41,7 +41,7 @@ def test_an_observation_contains_the_requested_images(episode):
     assert 0.0 < observation.depth.min() and observation.depth.max() <= 100.0
     assert observation.ids is None and observation.granted["classes"] == []
     assert list(observation.proprioception["hands"]) == [None, None]
-    values, mask = world.own()
+    values, mask = world.proprioception()
     assert values.shape == (len(chaic.PROPRIOCEPTION),) and mask.shape == (len(chaic.ACTIONS),)
     possible = {name for name, can in zip(chaic.ACTIONS, mask, strict=True) if can}
     assert "pick_up_left" in possible and "put_in" not in possible
@@ -95,7 +95,7 @@ def test_render_accepts_an_agent_or_a_camera(episode):
     }
     camera = world.observe().camera | {"width": 40, "height": 30}
     assert world.render(camera=camera)["rgb"].shape == (30, 40, 3)
-    assert world.plan(200).shape[1] == 200
+    assert world.floor_plan(200).shape[1] == 200
     assert world._repr_png_()[:4] == b"\x89PNG"
 
 
@@ -229,11 +229,11 @@ def test_a_planner_executes_the_chosen_plans(episode):
     planner.reset(world.briefing())
     n_chosen = 0
     while world.advance() == "needs_action" and world.frame < 1500:
-        action = planner.attend(world.observe())
+        action = planner.act(world.observe())
         while action is None:
             plans = planner.plans()
-            vectors = planner.plan_numbers()
-            assert vectors.shape == (len(plans), len(chaic.PLAN))
+            vectors = planner.plan_features()
+            assert vectors.shape == (len(plans), len(chaic.PLAN_FEATURES))
             assert (vectors[:, :11].sum(axis=1) == 1).all()
             with pytest.raises(IndexError):
                 planner.choose(len(plans))
@@ -242,8 +242,58 @@ def test_a_planner_executes_the_chosen_plans(episode):
             n_chosen += 1
         world.submit(action)
     assert n_chosen > 2
-    assert len(planner.things()) > 5
+    assert len(planner.remembered_objects()) > 5
     assert planner.semantic_map(32)[0].sum() > 100, "the map contains observed cells"
+
+
+def test_agents_without_a_briefing_say_so(episode):
+    observation = waiting(episode).observe()
+    for agent in (chaic.PlanningAgent("random"), chaic.Planner()):
+        with pytest.raises(RuntimeError, match="call reset"):
+            agent.act(observation)
+
+
+def test_behavior_from_images_needs_a_helper_inside_a_world():
+    for create in (lambda: chaic.PlanningAgent("rhp", behavior="learned"), lambda: chaic.Planner(behavior="learned")):
+        with pytest.raises(ValueError, match="images between decisions"):
+            create()
+
+
+def test_a_planner_follows_the_rules_of_its_world(episode):
+    inside = chaic.World(episode, helper="rhp", rules="compat")
+    agent = chaic.PlanningAgent("rhp", rules="compat")
+    outside = chaic.World(episode, grants=agent.grants, images=["depth", "ids"], image_size=512, rules="compat")
+    agent.reset(outside.briefing())
+    while outside.advance(600) == "needs_action":
+        outside.submit(agent.act(outside.observe()))
+    inside.advance(600)
+    assert outside.digest() == inside.digest()
+    with pytest.raises(ValueError, match="papr"):
+        chaic.Planner(rules="papr")
+
+
+def test_batch_arrays_have_the_shape_of_the_images(episode):
+    batch = chaic.Batch([episode], [0], images=["depth"], image_size=16)
+    batch.advance()
+    depth = np.zeros((1, 16, 16), np.float32)
+    batch.observe(depth=depth)
+    wrong = [
+        {"depth": depth.reshape(16, 16, 1)},
+        {"depth": np.zeros((1, 8, 32), np.float32)},
+        {"depth": depth, "rgb": np.zeros(0, np.uint8)},
+        {},
+    ]
+    for arrays in wrong:
+        with pytest.raises(ValueError):
+            batch.observe(**arrays)
+
+
+def test_a_view_is_that_of_the_helper_or_of_a_camera(episode):
+    world = waiting(episode)
+    assert (world.render()["rgb"] == world.render(1)["rgb"]).all()
+    assert (world.render()["rgb"] != world.render(0)["rgb"]).any()
+    with pytest.raises(ValueError, match="agent or a camera"):
+        world.render(0, camera=world.observe().camera)
 
 
 def test_the_detector_finds_objects_in_an_image(episode):
@@ -266,6 +316,10 @@ def test_old_names_warn_or_name_the_new_one(episode):
     world = waiting(episode)
     for instance, old, new in [
         (world.observe(), "own", "proprioception"),
+        (world, "own", "proprioception"),
+        (world, "plan", "floor_plan"),
+        (chaic.Planner(), "attend", "act"),
+        (chaic.Planner(), "things", "remembered_objects"),
         (world.observe(), "film", "frame_history"),
         (world.briefing(), "told", "disclosure"),
         (chaic.PlanningAgent("rhp"), "senses", "sensors"),

@@ -8,7 +8,7 @@ import pytest
 import chaic
 from chaic import zoo
 
-OPTIONS = {"image_size": 32, "observation": ("rgb", "own")}
+OPTIONS = {"image_size": 32, "observation": ("rgb", "proprioception")}
 
 with warnings.catch_warnings():
     # Imports of PettingZoo's tests raise warnings.
@@ -54,6 +54,21 @@ def test_no_reward_is_lost_when_an_agent_ends_early():
         rewards.extend([reward] if agent == "helper" else [])
         env.step(None if terminated or truncated else np.array(rows[agent]))
     assert [reward != 0.0 for reward in rewards] == [False, True, True, True, True]
+
+
+def test_the_last_step_pays_what_a_running_action_has_earned():
+    weights = {"invalid": 0.0, "progress_per_m": 1.0}
+    rows = {"partner": [chaic.ACTIONS.index("put_in"), 0, 0], "helper": [chaic.ACTIONS.index("move_forward"), 0, 0]}
+    env = zoo.parallel_env("obstacle", max_cycles=3, reward=weights, **OPTIONS)
+    observations, infos = env.reset(seed=1)
+    observations["helper"].clear()
+    rewards = []
+    while env.agents:
+        observations, reward, _, _, infos = env.step({agent: np.array(rows[agent]) for agent in zoo.AGENTS})
+        assert set(observations["helper"]) == set(env.observation_space("helper"))
+        rewards.append((reward["helper"], infos["helper"]["needs_action"]))
+    # The helper still walks at the end.
+    assert rewards[-1][1] == 0 and rewards[-1][0] != 0.0, rewards
 
 
 def test_the_agent_whose_action_ended_is_next():

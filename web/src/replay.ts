@@ -303,7 +303,7 @@ function branch({ branch_at, frames_per_second }: ReplayInfo): string {
 function legend(): TemplateResult {
   return html`<p class="legend">
     <span class="key walk"></span> walks <span class="key interact"></span> uses its hands
-    <span class="key failed"></span> in vain (×) <span class="key wait"></span> waits
+    <span class="key failed"></span> failed (×) <span class="key wait"></span> waits
     <span class="key triangle">▼</span> delivery
   </p>`;
 }

@@ -101,12 +101,15 @@ impl Episode {
         let (guardian, helper) =
             (self.position_of(self.guardian()), self.position_of(self.helper()));
         let (now, rules) = (self.memory.frame, self.memory.rules.child);
-        let is_due = self.last_decision.is_none_or(|since| now > since + rules.plan_frames);
+        let is_due =
+            self.last_decision.is_none_or(|since| now > since + rules.decision_interval_frames);
         let next = match self.behavior {
-            ChildBehavior::RunAway(_) if distance_m(helper) < rules.caught_m => {
+            ChildBehavior::RunAway(_) if distance_m(helper) < rules.turn_back_distance_m => {
                 ChildBehavior::GotoGuardian
             }
-            ChildBehavior::GotoGuardian if is_due && distance_m(guardian) < rules.home_m => {
+            ChildBehavior::GotoGuardian
+                if is_due && distance_m(guardian) < rules.returned_distance_m =>
+            {
                 ChildBehavior::Follow
             }
             ChildBehavior::Follow if is_due => {
@@ -132,7 +135,7 @@ impl Episode {
     fn draw_escape(&mut self) -> bool {
         self.n_draws += 1;
         match self.memory.rules.child_draws {
-            ChildDraws::Seeded => self.rng.chance(self.memory.rules.child.run_chance),
+            ChildDraws::Seeded => self.rng.chance(self.memory.rules.child.escape_probability),
             ChildDraws::Constant => ESCAPE_DRAWS.contains(&self.n_draws),
         }
     }
@@ -141,7 +144,7 @@ impl Episode {
     /// percentile of distance from the guardian.
     fn escape_target(&mut self, guardian: Vec3) -> Option<Vec2> {
         let rules = self.memory.rules.child;
-        let inside = self.briefing.bounds.expanded(-rules.border_m);
+        let inside = self.briefing.bounds.expanded(-rules.bounds_margin_m);
         let here = self.memory.position();
         let to_guardian = yaw_towards(self.memory.pose.position, guardian);
         let mut kept: Vec<(f32, Vec2)> = Vec::new();
@@ -153,9 +156,11 @@ impl Episode {
             let from_guardian_m = point.distance(to_xz(guardian));
             let yaw = yaw_towards(self.memory.pose.position, Vec3::new(point.x, 0.0, point.y));
             let off = wrap_angle(yaw - to_guardian).abs();
-            let is_far = from_guardian_m > rules.far_m;
-            let min_off_rad = if is_far { rules.off_far_rad } else { rules.off_rad };
-            if point.distance(here) > rules.run_min_m && off > min_off_rad && self.is_free(point) {
+            let is_far = from_guardian_m > rules.far_from_guardian_m;
+            let min_off_rad =
+                if is_far { rules.escape_min_angle_far_rad } else { rules.escape_min_angle_rad };
+            if point.distance(here) > rules.escape_min_m && off > min_off_rad && self.is_free(point)
+            {
                 kept.push((from_guardian_m, point));
             }
             if kept.len() == MAX_POINTS {
@@ -168,7 +173,9 @@ impl Episode {
 
     fn is_free(&self, point: Vec2) -> bool {
         let Memory { map, rules, .. } = &self.memory;
-        map.grid().disc(point, rules.child.free_m).all(|c| map.state(c) < CellOccupancy::Occupied)
+        map.grid()
+            .disc(point, rules.child.target_clearance_m)
+            .all(|c| map.state(c) < CellOccupancy::Occupied)
     }
 
     fn act(&mut self, observation: &Observation) -> Intent {
@@ -192,7 +199,7 @@ impl Episode {
             ChildBehavior::RunAway(point) => self.run_towards(point),
             ChildBehavior::Follow | ChildBehavior::GotoGuardian => {
                 let Some(guardian) = self.guardian() else { return self.idle() };
-                let keep_m = self.memory.rules.child.follow_m;
+                let keep_m = self.memory.rules.child.follow_distance_m;
                 match self.follower.step(
                     &mut self.memory,
                     self.navigator.as_mut(),
@@ -211,7 +218,7 @@ impl Episode {
     }
 
     fn run_towards(&mut self, point: Vec2) -> Intent {
-        let arrival_m = self.memory.rules.child.there_m;
+        let arrival_m = self.memory.rules.child.arrival_distance_m;
         match self.navigator.step(&mut self.memory, &Destination::near(point, arrival_m)) {
             NavigationStep::Act(action) => action,
             NavigationStep::Arrived => self.idle(),
@@ -330,7 +337,7 @@ mod tests {
             .map(Scenario::new)
             .find_map(|mut s| (s.state_at(0, 1.0, 9.0) == ChildState::Follow).then_some(s))
             .expect("most follow at first");
-        for frame in 1..=ChildRules::STANDARD.plan_frames {
+        for frame in 1..=ChildRules::STANDARD.decision_interval_frames {
             assert_eq!(
                 scenario.state_at(frame, 1.0, 9.0),
                 ChildState::Follow,
@@ -349,7 +356,11 @@ mod tests {
             // The first draw comes at once, the next ones every 101 frames.
             let first =
                 (0..2000).find(|frame| scenario.state_at(*frame, 1.0, 9.0) == ChildState::RunAway);
-            assert_eq!(first, Some(5 * (ChildRules::STANDARD.plan_frames + 1)), "seed {seed}");
+            assert_eq!(
+                first,
+                Some(5 * (ChildRules::STANDARD.decision_interval_frames + 1)),
+                "seed {seed}"
+            );
         }
     }
 
@@ -380,12 +391,12 @@ mod tests {
             let guardian = Vec3::new(2.0, 0.0, 0.0);
             let point = episode.escape_target(guardian).expect("there is room");
             assert!(episode.briefing.bounds.contains(point));
-            assert!(point.length() > ChildRules::STANDARD.run_min_m);
+            assert!(point.length() > ChildRules::STANDARD.escape_min_m);
             let off = wrap_angle(
                 yaw_towards(Vec3::ZERO, Vec3::new(point.x, 0.0, point.y))
                     - yaw_towards(Vec3::ZERO, guardian),
             );
-            assert!(off.abs() > ChildRules::STANDARD.off_far_rad);
+            assert!(off.abs() > ChildRules::STANDARD.escape_min_angle_far_rad);
         }
     }
 }

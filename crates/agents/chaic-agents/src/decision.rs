@@ -346,13 +346,13 @@ fn furniture_at_partner<'a>(
     let rules = memory.rules.lifting;
     let partner = memory
         .companion(briefing, CompanionRole::Partner)
-        .filter(|p| p.frame + rules.at_piece_frames > memory.frame)
+        .filter(|p| p.frame + rules.partner_sighting_max_age_frames > memory.frame)
         .map(|p| to_xz(p.position_in_world));
     memory
         .objects
         .iter()
         .filter(|t| t.class.info().role == Role::HeavyTarget && t.is_available(memory.frame))
-        .filter(move |t| partner.is_some_and(|p| t.distance_from(p) < rules.at_piece_m))
+        .filter(move |t| partner.is_some_and(|p| t.distance_from(p) < rules.partner_at_furniture_m))
         .map(Subject::from_object)
 }
 

@@ -23,7 +23,7 @@ use chaic_core::{Action, Briefing, FailureReason, Frame, Hand, Outcome, Role, Ve
 
 use crate::decision::{HandState, Plan};
 use crate::memory::Memory;
-use crate::rules::{Exploration, PlaceChoice, PlanLimits, PlannerRules, Walking};
+use crate::rules::{Exploration, PlaceChoice, PlanTimeouts, PlannerRules, Walking};
 use crate::track::{Intent, TrackId};
 use careful_navigation::CarefulNavigator;
 use compat::lattice_navigation::LatticeNavigator;
@@ -125,7 +125,7 @@ impl Executor {
         self.follower = Follower::default();
         self.random_explorer.reset();
         self.interaction = None;
-        let kept_frames = rules.failures.bad_place_frames;
+        let kept_frames = rules.failures.failed_position_frames;
         self.failed_positions.retain(|(_, _, since)| since + kept_frames > now);
         self.plan_start = now;
         (self.n_turns, self.n_lifts) = (0, 0);
@@ -135,7 +135,7 @@ impl Executor {
     /// Returns the next action of `plan`.
     pub fn step(&mut self, plan: &Plan, s: &mut ExecutionContext<'_>) -> Progress {
         let elapsed = s.memory.frame.saturating_sub(self.plan_start);
-        if elapsed > time_limit(plan, &s.memory.rules.limits) {
+        if elapsed > time_limit(plan, &s.memory.rules.plan_timeouts) {
             self.give_up(plan, s);
             return Progress::Failed;
         }
@@ -143,7 +143,7 @@ impl Executor {
             // The time limit runs only while the child is lost or, without trust in the child,
             // while it is not away.
             let child = s.memory.companion(s.briefing, CompanionRole::Child);
-            let is_needed = match s.memory.rules.trusts_child {
+            let is_needed = match s.memory.rules.leaves_returning_child {
                 true => child.is_some_and(|c| c.is_in_view),
                 false => s.memory.child_is_away(s.briefing),
             };
@@ -195,13 +195,13 @@ impl Executor {
             }
             Plan::TurnAround => {
                 self.n_turns += 1;
-                let has_seen = s.memory.rules.stops_turning_when_found && has_seen_both(s);
-                let is_done = self.n_turns > s.memory.rules.around_turns || has_seen;
+                let has_seen = s.memory.rules.look_around_stops_when_found && has_seen_both(s);
+                let is_done = self.n_turns > s.memory.rules.look_around_turns || has_seen;
                 if is_done { Progress::Done } else { Progress::Act(Action::TurnLeft) }
             }
             Plan::Wait => {
                 self.n_turns += 1;
-                let action = Action::Wait { frames: s.memory.rules.limits.wait_frames };
+                let action = Action::Wait { frames: s.memory.rules.plan_timeouts.wait_frames };
                 if self.n_turns > 1 { Progress::Done } else { Progress::Act(action) }
             }
         }
@@ -220,7 +220,7 @@ impl Executor {
             }
             Plan::Deliver => {
                 if let Some(place) = self.place {
-                    let until = s.memory.frame + s.memory.rules.goal_blackout_frames;
+                    let until = s.memory.frame + s.memory.rules.failed_goal_place_frames;
                     s.memory.objects.ignore(place, until);
                 }
             }
@@ -275,9 +275,11 @@ impl Executor {
         let partner = s.memory.companion(s.briefing, CompanionRole::Partner);
         let lifting = s.memory.rules.lifting;
         let partner_left = partner.is_some_and(|p| {
-            p.is_in_view && object.distance_from(to_xz(p.position_in_world)) > lifting.left_piece_m
+            p.is_in_view
+                && object.distance_from(to_xz(p.position_in_world))
+                    > lifting.partner_left_furniture_m
         });
-        if together && (partner_left || self.n_lifts >= lifting.tries_together) {
+        if together && (partner_left || self.n_lifts >= lifting.max_failed_joint_lifts) {
             return Progress::Failed;
         }
         let hand = if is_heavy { Hand::Left } else { hand };
@@ -376,7 +378,7 @@ impl Executor {
                 let stood_frames = s.memory.frame.saturating_sub(since);
                 let rules = s.memory.rules;
                 let is_enough =
-                    rules.trusts_child && stood_frames > rules.people.child_stand_frames;
+                    rules.leaves_returning_child && stood_frames > rules.people.child_stand_frames;
                 if role == CompanionRole::Child && is_enough {
                     return Progress::Done;
                 }
@@ -396,7 +398,7 @@ fn has_seen_both(s: &ExecutionContext<'_>) -> bool {
     })
 }
 
-fn time_limit(plan: &Plan, limits: &PlanLimits) -> Frame {
+fn time_limit(plan: &Plan, limits: &PlanTimeouts) -> Frame {
     match plan {
         Plan::Explore => limits.explore_frames,
         Plan::FollowPartner => limits.follow_partner_frames,

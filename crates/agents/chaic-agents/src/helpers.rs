@@ -94,8 +94,8 @@ pub static HELPERS: [HelperInfo; 11] = [
         grants: planner_grants,
     },
     HelperInfo {
-        name: "infer_told",
-        title: "Infer, told",
+        name: "infer_known_goal",
+        title: "Infer, known goal",
         about: "infer with the goal granted",
         make: |rules, factory| Box::new(infer(rules, factory, InferOptions::ALL)),
         grants: |rules| Grants { goal: true, ..planner_grants(rules) },
@@ -117,7 +117,7 @@ pub static HELPERS: [HelperInfo; 11] = [
 ];
 
 fn planner_grants(rules: PlannerRules) -> Grants {
-    Grants { behavior: rules.knows_holding, ..Grants::PLANNER }
+    Grants { behavior: rules.knows_partner_behavior, ..Grants::PLANNER }
 }
 
 impl HelperInfo {
@@ -199,12 +199,12 @@ mod tests {
                 let is_among = |names: &[&str]| names.contains(&name);
                 assert_eq!(
                     grants.goal,
-                    is_among(&["oracle", "infer_told", "oracle_plan"]),
+                    is_among(&["oracle", "infer_known_goal", "oracle_plan"]),
                     "{name}"
                 );
                 assert!(grants.ids && grants.goal_place, "{name}");
                 let is_bound = is_among(&["ideal_observer", "oracle_plan"]);
-                let knows_behavior = is_bound || name == "oracle" || rules.knows_holding;
+                let knows_behavior = is_bound || name == "oracle" || rules.knows_partner_behavior;
                 assert_eq!(grants.behavior, knows_behavior, "{name}");
                 assert_eq!((grants.state, grants.positions), (is_bound, is_bound), "{name}");
                 assert_eq!(grants.task, name == "oracle_plan", "{name}");

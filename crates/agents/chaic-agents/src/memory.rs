@@ -168,8 +168,8 @@ impl Memory {
         self.saw_people_recently = self.people.iter().any(|p| p.frame + 60 > self.frame);
         let in_view: Vec<Vec3> =
             self.people.iter().filter(|p| p.is_in_view).map(|p| p.position_in_world).collect();
-        let people_at = if self.rules.sees_holding { &in_view[..] } else { &[] };
-        self.objects.update(detections, people_at, self.rules.held_frames, self.frame);
+        let people_at = if self.rules.sees_held_objects { &in_view[..] } else { &[] };
+        self.objects.update(detections, people_at, self.rules.seen_held_ignore_frames, self.frame);
         if self.rules.forgets_missing {
             self.objects.forget_missing(observation);
         }
@@ -219,7 +219,7 @@ impl Memory {
     fn apply_grants(&mut self, observation: &Observation) {
         let granted = &observation.granted;
         for held in granted.partner_hands.iter().flatten().flatten() {
-            let until = self.frame + self.rules.held_frames;
+            let until = self.frame + self.rules.seen_held_ignore_frames;
             for (entity, class) in std::iter::once(&(held.entity, held.class)).chain(&held.contents)
             {
                 self.classes.insert((*entity).into(), *class);
@@ -452,7 +452,7 @@ impl Memory {
 
     /// Returns whether a goal place is ignored now. The paper's rules ignore none.
     pub fn is_blacked_out(&self, place: &MappedObject) -> bool {
-        self.rules.goal_blackout_frames > 0 && self.frame < place.ignore_until
+        self.rules.failed_goal_place_frames > 0 && self.frame < place.ignore_until
     }
 
     /// Returns whether child and partner are too far apart: both in view, or both seen recently

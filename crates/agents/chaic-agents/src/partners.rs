@@ -48,7 +48,7 @@ pub fn recorded_partner(recording: Arc<PlanRecording>, rules: PlannerRules) -> B
 
 /// Returns the grants of a task's partner under these rules.
 pub fn partner_grants(rules: PlannerRules) -> Grants {
-    Grants { behavior: rules.knows_holding, ..PARTNER_GRANTS }
+    Grants { behavior: rules.knows_partner_behavior, ..PARTNER_GRANTS }
 }
 
 /// Constructs the agent of the child in the shopping task. It requires [`Grants::CHILD`].

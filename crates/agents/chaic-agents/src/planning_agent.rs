@@ -313,7 +313,7 @@ impl<P: Policy> PlanningAgent<P> {
             _ => return None,
         };
         let has_failed = matches!(last.outcome, Some(Outcome::Failure(_)));
-        let suffix = if has_failed { " in vain" } else { "" };
+        let suffix = if has_failed { " (failed)" } else { "" };
         Some(format!("frame {}: {} {description}{suffix}", last.frame, last.agent))
     }
 

@@ -9,7 +9,7 @@ use chaic_core::Frame;
 use chaic_core::briefing::Briefing;
 use serde::{Deserialize, Serialize};
 
-pub use groups::{ChildRules, FailureRules, LiftingRules, PeopleRules, PlanLimits, TimeRules};
+pub use groups::{ChildRules, FailureRules, LiftingRules, PeopleRules, PlanTimeouts, TimeRules};
 pub use profile::{RuleProfile, TargetFilter, TargetOrder};
 
 /// Navigation: path planning and path following.
@@ -45,8 +45,8 @@ pub enum Exploration {
 pub enum Bookkeeping {
     /// The objects of the goal without those delivered or held by any agent.
     Exact,
-    /// The partner drops a class of which one object is needed after its own first pick, and no
-    /// other class ever. Helpers that know the goal never drop any (facts A2.2).
+    /// After its first pick-up, the partner stops looking for that class if one object of it was
+    /// wanted. It never removes other classes, and helpers that know the goal remove none (facts A2.2).
     FirstPick,
 }
 
@@ -100,11 +100,14 @@ pub struct PlannerRules {
     /// Exploration strategy.
     pub exploration: Exploration,
     /// True if every agent first looks around.
-    pub looks_around_first: bool,
+    #[serde(alias = "looks_around_first")]
+    pub initial_look_around: bool,
     /// True if a plan is replaced when a better one becomes valid.
-    pub reconsiders: bool,
+    #[serde(alias = "reconsiders")]
+    pub replans: bool,
     /// True if decisions consider the time to fetch an object or to reach the goal place.
-    pub weighs_time: bool,
+    #[serde(alias = "weighs_time")]
+    pub checks_time_to_deliver: bool,
     /// True if agents deliver as soon as nothing is left to find, rather than when time runs out.
     pub delivers_when_done: bool,
     /// Minimum number of objects still needed for which a container is fetched.
@@ -113,7 +116,8 @@ pub struct PlannerRules {
     pub bookkeeping: Bookkeeping,
     /// Choice among several goal places.
     pub place_choice: PlaceChoice,
-    /// Distance from which an object is picked up, meters (the world steps up from 3 m).
+    /// Distance from which an object is picked up, meters (the world accepts pick-ups from up to 3 m and
+    /// walks the rest).
     pub pick_within_m: f32,
     /// Distance from which an object is put on a goal place, meters.
     pub put_within_m: f32,
@@ -122,15 +126,19 @@ pub struct PlannerRules {
     pub any_failure_counts: bool,
     /// Time for which a goal place is ignored after a failed put-on or a delivery that timed out,
     /// frames. The plan ends, even if the other hand holds something (facts A1.9, A2.1).
-    pub goal_blackout_frames: Frame,
+    #[serde(alias = "goal_blackout_frames")]
+    pub failed_goal_place_frames: Frame,
     /// Time for which an object is avoided after another agent was observed to hold it, frames.
-    pub held_frames: Frame,
+    #[serde(alias = "held_frames")]
+    pub seen_held_ignore_frames: Frame,
     /// True if an object is forgotten when its position is seen empty.
     pub forgets_missing: bool,
     /// True if agents see that an object is in another agent's hands.
-    pub sees_holding: bool,
+    #[serde(alias = "sees_holding")]
+    pub sees_held_objects: bool,
     /// True if partner and rule-based helpers know what the other holds while it is in view.
-    pub knows_holding: bool,
+    #[serde(alias = "knows_holding")]
+    pub knows_partner_behavior: bool,
     /// True if rule-based helpers perceive people at all. The original's detector has no class for
     /// people, and its result replaces the environment's data (facts A5).
     pub helpers_see_people: bool,
@@ -145,25 +153,29 @@ pub struct PlannerRules {
     /// Distribution of the random helper's plans.
     pub random_draw: RandomDraw,
     /// Number of turns to look around.
-    pub around_turns: u32,
+    #[serde(alias = "around_turns")]
+    pub look_around_turns: u32,
     /// True if looking around ends as soon as partner and child have both been seen.
-    pub stops_turning_when_found: bool,
+    #[serde(alias = "stops_turning_when_found")]
+    pub look_around_stops_when_found: bool,
     /// True if helpers with rules for the child apply them; the ablation shows their benefit
     /// (ours).
-    pub minds_child: bool,
+    #[serde(alias = "minds_child")]
+    pub supervises_child: bool,
     /// Time after which an unseen child or guardian is searched for, frames.
     pub child_unseen_frames: Frame,
     /// True if a helper stays with the child only until it turns back, rather than for a fixed time
     /// after it was last seen away.
-    pub trusts_child: bool,
+    #[serde(alias = "trusts_child")]
+    pub leaves_returning_child: bool,
     /// Source of the draws by which the child runs away.
     pub child_draws: ChildDraws,
     /// Time budgeting and replanning.
     #[serde(default)]
     pub time: TimeRules,
     /// Time limits of plans.
-    #[serde(default)]
-    pub limits: PlanLimits,
+    #[serde(default, alias = "limits")]
+    pub plan_timeouts: PlanTimeouts,
     /// Consequences of failed attempts.
     #[serde(default)]
     pub failures: FailureRules,
@@ -184,9 +196,9 @@ impl PlannerRules {
         PlannerRules {
             walking: Walking::Careful,
             exploration: Exploration::Frontier,
-            looks_around_first: true,
-            reconsiders: true,
-            weighs_time: true,
+            initial_look_around: true,
+            replans: true,
+            checks_time_to_deliver: true,
             delivers_when_done: true,
             min_for_container: 3,
             bookkeeping: Bookkeeping::Exact,
@@ -194,24 +206,24 @@ impl PlannerRules {
             pick_within_m: 1.4,
             put_within_m: 1.8,
             any_failure_counts: false,
-            goal_blackout_frames: 0,
-            held_frames: 300,
+            failed_goal_place_frames: 0,
+            seen_held_ignore_frames: 300,
             forgets_missing: true,
-            sees_holding: true,
-            knows_holding: false,
+            sees_held_objects: true,
+            knows_partner_behavior: false,
             helpers_see_people: true,
             helper_known_range_m: 5.0,
             lifts_together: true,
             obstacle_choice: ObstacleChoice::InPassages,
             random_draw: RandomDraw::Plans,
-            around_turns: 18,
-            stops_turning_when_found: false,
-            minds_child: true,
+            look_around_turns: 18,
+            look_around_stops_when_found: false,
+            supervises_child: true,
             child_unseen_frames: 200,
-            trusts_child: true,
+            leaves_returning_child: true,
             child_draws: ChildDraws::Seeded,
             time: TimeRules::STANDARD,
-            limits: PlanLimits::STANDARD,
+            plan_timeouts: PlanTimeouts::STANDARD,
             failures: FailureRules::STANDARD,
             lifting: LiftingRules::STANDARD,
             people: PeopleRules::STANDARD,
@@ -224,9 +236,9 @@ impl PlannerRules {
         PlannerRules {
             walking: Walking::Lattice,
             exploration: Exploration::Sampled,
-            looks_around_first: false,
-            reconsiders: false,
-            weighs_time: false,
+            initial_look_around: false,
+            replans: false,
+            checks_time_to_deliver: false,
             delivers_when_done: false,
             min_for_container: 0,
             bookkeeping: Bookkeeping::FirstPick,
@@ -234,24 +246,24 @@ impl PlannerRules {
             pick_within_m: 1.5,
             put_within_m: 2.0,
             any_failure_counts: true,
-            goal_blackout_frames: 500,
-            held_frames: 500,
+            failed_goal_place_frames: 500,
+            seen_held_ignore_frames: 500,
             forgets_missing: false,
-            sees_holding: false,
-            knows_holding: true,
+            sees_held_objects: false,
+            knows_partner_behavior: true,
             helpers_see_people: false,
             helper_known_range_m: 3.0,
             lifts_together: false,
             obstacle_choice: ObstacleChoice::All,
             random_draw: RandomDraw::KindsFirst,
-            around_turns: 24,
-            stops_turning_when_found: true,
-            minds_child: true,
+            look_around_turns: 24,
+            look_around_stops_when_found: true,
+            supervises_child: true,
             child_unseen_frames: 200,
-            trusts_child: false,
+            leaves_returning_child: false,
             child_draws: ChildDraws::Constant,
             time: TimeRules::STANDARD,
-            limits: PlanLimits::STANDARD,
+            plan_timeouts: PlanTimeouts::STANDARD,
             failures: FailureRules::STANDARD,
             lifting: LiftingRules::STANDARD,
             people: PeopleRules::STANDARD,

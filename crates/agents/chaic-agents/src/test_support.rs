@@ -232,7 +232,7 @@ impl Toy {
                 footprint: if class.info().is_carriable() { vec![] } else { corners.collect() },
                 holder: None,
                 container: None,
-                is_out_of_play: self.delivered.contains(&s.entity.into()),
+                is_gone: self.delivered.contains(&s.entity.into()),
             }
         };
         WorldState {

@@ -287,6 +287,14 @@ impl Env {
         }
         let turn = &mut self.turns[agent.index()];
         let slot = &mut self.slots[agent.index()];
+        // An agent without images can still point at what its camera sees.
+        if has_pixel
+            && !slot.sensors.wants_image()
+            && let Some(rendered) = &mut turn.rendered
+        {
+            let size = slot.sensors.image_size;
+            rendered.hidden_ids = Some(self.renderer.render_ids(&self.world, agent, size));
+        }
         let resolved = match &turn.rendered {
             Some(rendered) => rendered.resolve(action),
             None => resolve_unseen(slot, action),

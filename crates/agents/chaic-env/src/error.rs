@@ -172,11 +172,14 @@ impl EnvError {
     /// Returns whether the caller's arguments caused the error.
     pub fn is_usage(&self) -> bool {
         use EnvError::{
-            InvalidPartner, PartnerFile, Partners, Rule, UnknownHelper, UnknownPartner, UnknownRule,
+            Batch, Buffer, InvalidPartner, PartnerFile, Partners, Rule, UnknownHelper,
+            UnknownPartner, UnknownRule,
         };
         matches!(
             self,
-            UnknownHelper { .. }
+            Batch(_)
+                | Buffer { .. }
+                | UnknownHelper { .. }
                 | UnknownPartner { .. }
                 | InvalidPartner { .. }
                 | PartnerFile { .. }

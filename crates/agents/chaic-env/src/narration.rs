@@ -136,7 +136,7 @@ pub fn event_text(setup: &Setup, event: &EventKind) -> Option<String> {
         EventKind::Ended { agent, action, outcome: Outcome::Failure(reason) }
             if action.subject().is_some() =>
         {
-            format!("{agent} {} in vain: {reason}", action_text(setup, &action))
+            format!("{agent} {}, failed: {reason}", action_text(setup, &action))
         }
         EventKind::LiftedTogether { object, .. } => format!("both lift {}", name(object)),
         EventKind::ChildAway { away: true } => "the child is away".to_owned(),

@@ -141,6 +141,16 @@ impl ObservationRenderer {
         rgb
     }
 
+    /// Renders the ids of an agent's view, which resolve pixels in actions.
+    pub(crate) fn render_ids(&self, world: &World, agent: AgentId, image_size: u32) -> Vec<u16> {
+        let channels = Channels { rgb: false, depth: false, ids: true };
+        let view = View::from_agent(world, agent, image_size, channels);
+        let mut ids = vec![0; view.camera.width as usize * view.camera.height as usize];
+        let images = ImagesMut { ids: Some(&mut ids), ..ImagesMut::default() };
+        self.scene.render_view_into(world, &view, images);
+        ids
+    }
+
     /// Renders the observation of one agent with its images in the caller's buffers. The buffer `ids`
     /// becomes the id image that resolves pixels in actions.
     pub(crate) fn observe_into(

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+pub(crate) mod renamed;
+
 pub use chaic_agents::PlannerRules;
 pub use chaic_world::Rules;
 use serde::{Deserialize, Serialize};
@@ -55,7 +57,7 @@ impl RuleSet {
         }
     }
 
-    /// Returns the set with one rule changed by `NAME=VALUE`, such as `world.dropped_counts=true`. The
+    /// Returns the set with one rule changed by `NAME=VALUE`, such as `world.failed_put_on_can_deliver=true`. The
     /// values `paper` and `compat` copy the rule of that set.
     ///
     /// # Errors
@@ -75,8 +77,9 @@ impl RuleSet {
         let pointer = format!("/{}", name.replace('.', "/"));
         let mut all = self.to_value();
         let old = all.pointer(&pointer).filter(|_| name != "name");
-        let old = old.ok_or_else(|| {
-            wrong(format!("no rule `{name}`; the rules are {}", rule_names().join(", ")))
+        let old = old.ok_or_else(|| match renamed::current_name(name) {
+            Some(current) => wrong(format!("the rule is now called `{current}`")),
+            None => wrong(format!("no rule `{name}`; the rules are {}", rule_names().join(", "))),
         })?;
         let named_set = text.parse().ok().map(|set| RuleSet::named(set).to_value());
         let new = match named_set.as_ref().and_then(|set| set.pointer(&pointer)) {

@@ -23,8 +23,9 @@ use crate::rules::RuleSet;
 /// Value of the field `format` of a header.
 pub const FORMAT: &str = "chaic-trace";
 /// Version of the format that is written.
-pub const VERSION: u32 = 3;
-/// Oldest version that is read. Version 2 has other names of some fields, which are aliases here.
+pub const VERSION: u32 = 4;
+/// Oldest version that is read. Earlier versions have other names of some fields and rules, which are
+/// aliases here.
 pub const MIN_VERSION: u32 = 2;
 
 /// Configuration of an episode run: setup, rules, agents and grants.

@@ -19,7 +19,7 @@ use crate::rules::RuleSet;
 pub enum Track {
     /// Helpers may have any grant that they ask for.
     #[default]
-    #[serde(rename = "told")]
+    #[serde(alias = "told")]
     Unrestricted,
     /// Helpers perceive pixels and their own body; the goal place is the only grant.
     Hidden,
@@ -41,8 +41,8 @@ pub struct TrackInfo {
     pub allows_partial_sandbox: bool,
 }
 
-const TOLD: TrackInfo = TrackInfo {
-    name: "told",
+const UNRESTRICTED: TrackInfo = TrackInfo {
+    name: "unrestricted",
     allowed: Grants::ALL,
     perception: None,
     allows_disclosing_rules: true,
@@ -65,8 +65,8 @@ const DISCLOSING_RULES: [DisclosingRule; 4] = [
     ("world.containers_with_wheelchair", |rules| !rules.world.containers_with_wheelchair),
     // Helpers feel which piece of furniture the partner chooses, at any distance.
     ("world.joint_lift", |rules| rules.world.joint_lift == JointLift::LastChoice),
-    ("world.tells_removed", |rules| rules.world.tells_removed),
-    ("planner.knows_holding", |rules| rules.planner.knows_holding),
+    ("world.announces_removed_obstacles", |rules| rules.world.announces_removed_obstacles),
+    ("planner.knows_partner_behavior", |rules| rules.planner.knows_partner_behavior),
 ];
 
 impl Track {
@@ -76,7 +76,7 @@ impl Track {
     /// Returns what the track allows and requires.
     pub const fn info(self) -> &'static TrackInfo {
         match self {
-            Track::Unrestricted => &TOLD,
+            Track::Unrestricted => &UNRESTRICTED,
             Track::Hidden => &HIDDEN,
         }
     }
@@ -178,7 +178,7 @@ impl FromStr for Track {
 
     fn from_str(text: &str) -> Result<Track, String> {
         let found = Track::ALL.into_iter().find(|track| track.info().name == text);
-        found.ok_or_else(|| format!("unknown track `{text}`; write told or hidden"))
+        found.ok_or_else(|| format!("unknown track `{text}`; write unrestricted or hidden"))
     }
 }
 
@@ -253,6 +253,6 @@ mod tests {
             assert_eq!(track.to_string().parse(), Ok(track));
             assert_eq!(serde_json::to_value(track).unwrap(), track.info().name);
         }
-        assert!("open".parse::<Track>().unwrap_err().contains("told or hidden"));
+        assert!("open".parse::<Track>().unwrap_err().contains("unrestricted or hidden"));
     }
 }

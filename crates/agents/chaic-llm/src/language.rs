@@ -33,9 +33,9 @@ struct Kind {
 
 const HELPERS: [Kind; 4] = [
     Kind { name: "llm", track: PromptTrack::Hidden, has_images: false },
-    Kind { name: "llm-told", track: PromptTrack::Told, has_images: false },
+    Kind { name: "llm_known_task", track: PromptTrack::KnownTask, has_images: false },
     Kind { name: "vlm", track: PromptTrack::Hidden, has_images: true },
-    Kind { name: "vlm-told", track: PromptTrack::Told, has_images: true },
+    Kind { name: "vlm_known_task", track: PromptTrack::KnownTask, has_images: true },
 ];
 const PARTNERS: [Kind; 2] = [
     Kind { name: "llm", track: PromptTrack::Partner, has_images: false },
@@ -158,10 +158,10 @@ impl LanguageHelpers {
 
     fn helper(&self, name: &str, key: Option<&RunKey>, rules: PlannerRules) -> Option<Helper> {
         let kind = HELPERS.into_iter().find(|k| k.name == name)?;
-        let is_told = kind.track == PromptTrack::Told;
+        let knows_task = kind.track == PromptTrack::KnownTask;
         let is_granted = self.session.settings.asking.behavior == BehaviorSource::Granted;
-        let behavior = is_told || is_granted || rules.knows_holding;
-        let grants = Grants { behavior, task: is_told, ..Grants::PLANNER };
+        let behavior = knows_task || is_granted || rules.knows_partner_behavior;
+        let grants = Grants { behavior, task: knows_task, ..Grants::PLANNER };
         let grants = self.perception.grants(grants);
         Some(self.agent(kind, key, grants, AgentId::PARTNER, rules, &*self.perception))
     }

@@ -366,7 +366,7 @@ impl Policy for LanguagePolicy {
         let profile = match (self.track, briefing.capability.gait) {
             (PromptTrack::Partner, Gait::WalkBike) => RuleProfile::RIDER,
             (PromptTrack::Partner, _) => RuleProfile::PARTNER,
-            (PromptTrack::Hidden | PromptTrack::Told, _) => RuleProfile::RHP,
+            (PromptTrack::Hidden | PromptTrack::KnownTask, _) => RuleProfile::RHP,
         };
         self.rules = RulePolicy::new(profile);
         self.rules.reset(briefing);

@@ -9,7 +9,7 @@ pub enum PromptTrack {
     /// Helper without a grant of goal and constraint.
     Hidden,
     /// Helper with the grants of the original.
-    Told,
+    KnownTask,
     /// Partner.
     Partner,
 }

@@ -98,7 +98,7 @@ pub enum AnswerForm {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BehaviorSource {
-    /// The helper's own perception; the `told` variants have a grant.
+    /// The helper's own perception; the `known_task` variants have a grant.
     #[default]
     Track,
     /// Ground truth while the partner is visible: a grant that every trace names.

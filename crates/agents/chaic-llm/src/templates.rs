@@ -29,7 +29,7 @@ macro_rules! built_in {
 /// Built-in templates: file name and text.
 pub const BUILT_IN: &[(&str, &str)] = built_in![
     "task.txt",
-    "task_told.txt",
+    "task_known.txt",
     "task_partner.txt",
     "self.txt",
     "others.txt",
@@ -111,7 +111,7 @@ impl Templates {
     pub fn prompt(&self, facts: &PromptContext, question: Question) -> Result<String> {
         let task = match facts.track {
             PromptTrack::Hidden => "task.txt",
-            PromptTrack::Told => "task_told.txt",
+            PromptTrack::KnownTask => "task_known.txt",
             PromptTrack::Partner => "task_partner.txt",
         };
         let ask = match question {

@@ -4,8 +4,11 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
 use chaic_core::{AgentError, AgentId};
-use chaic_env::{AdvanceOutcome, Env, EnvBatch, EpisodeConfig, ImagesMut, SlotId};
-use numpy::{Element, PyArray1, PyReadonlyArray2, PyReadwriteArray2, PyReadwriteArrayDyn};
+use chaic_env::{AdvanceOutcome, Env, EnvBatch, EpisodeConfig, ImageLayout, ImagesMut, SlotId};
+use numpy::{
+    Element, PyArray1, PyReadonlyArray2, PyReadwriteArray2, PyReadwriteArrayDyn,
+    PyUntypedArrayMethods as _,
+};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
@@ -45,12 +48,35 @@ struct ImageArrays<'py> {
 }
 
 impl ImageArrays<'_> {
-    fn images(&mut self) -> PyResult<ImagesMut<'_>> {
+    /// Returns the arrays as slices, after a check of their shapes.
+    fn images(&mut self, layout: ImageLayout) -> PyResult<ImagesMut<'_>> {
+        let (n, side) = (layout.slots, layout.size as usize);
+        check_shape("rgb", self.rgb.as_ref().map(|a| a.shape()), layout.rgb, &[n, side, side, 3])?;
+        let shape = [n, side, side];
+        check_shape("depth", self.depth.as_ref().map(|a| a.shape()), layout.depth, &shape)?;
+        check_shape("ids", self.ids.as_ref().map(|a| a.shape()), layout.ids, &shape)?;
         Ok(ImagesMut {
             rgb: slice_of(&mut self.rgb)?,
             depth_m: slice_of(&mut self.depth)?,
             ids: slice_of(&mut self.ids)?,
         })
+    }
+}
+
+/// Checks that an array is given exactly if its images are requested, and has their shape.
+fn check_shape(
+    name: &str,
+    found: Option<&[usize]>,
+    is_requested: bool,
+    expected: &[usize],
+) -> PyResult<()> {
+    match found {
+        Some(_) if !is_requested => Err(mistake(format!("no images of {name} are requested"))),
+        None if is_requested => Err(mistake(format!("the array {name} is missing"))),
+        Some(shape) if shape != expected => {
+            Err(mistake(format!("{name} has shape {shape:?}, expected {expected:?}")))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -154,8 +180,8 @@ impl Batch {
         ids: Option<PyReadwriteArrayDyn<'_, u16>>,
     ) -> PyResult<Bound<'py, PyArray1<u8>>> {
         let mut arrays = ImageArrays { rgb, depth, ids };
-        let images = arrays.images()?;
         let envs = self.envs()?;
+        let images = arrays.images(envs.layout())?;
         let outcomes = detached(py, || envs.advance_and_observe(None, images))?;
         outcome_codes(py, outcomes.map_err(|error| from_env(&error))?)
     }
@@ -172,14 +198,14 @@ impl Batch {
         ids: Option<PyReadwriteArrayDyn<'_, u16>>,
     ) -> PyResult<Vec<usize>> {
         let mut arrays = ImageArrays { rgb, depth, ids };
-        let images = arrays.images()?;
         let envs = self.envs()?;
+        let images = arrays.images(envs.layout())?;
         detached(py, || envs.observe(images))?.map_err(|error| from_env(&error))
     }
 
     /// Writes proprioception (`PROPRIOCEPTION`, float32 [slots, 12]) and the mask of `ACTIONS` that the hands allow
     /// (bool [slots, 11]) of all observed slots.
-    fn own(
+    fn proprioception(
         &mut self,
         mut values: PyReadwriteArray2<'_, f32>,
         mut mask: PyReadwriteArray2<'_, bool>,

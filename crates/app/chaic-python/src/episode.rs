@@ -58,7 +58,7 @@ impl Episode {
 
     /// Draws the top view, uint8 [height, width, 3].
     #[pyo3(signature = (width=640))]
-    fn plan<'py>(&self, py: Python<'py>, width: u32) -> PyResult<Bound<'py, PyArray3<u8>>> {
+    fn floor_plan<'py>(&self, py: Python<'py>, width: u32) -> PyResult<Bound<'py, PyArray3<u8>>> {
         if !(16..=8192).contains(&width) {
             return Err(mistake(format!("width is {width}, expected 16 to 8192")));
         }
@@ -92,7 +92,7 @@ impl Episode {
 
     /// Returns the picture for notebooks, as PNG.
     fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        encode_png(py, self.plan(py, 640)?.readonly())
+        encode_png(py, self.floor_plan(py, 640)?.readonly())
     }
 
     fn __repr__(&self) -> String {

@@ -1,8 +1,11 @@
 //! Runs with helpers that are Python objects.
 
+use std::ffi::CString;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
 
 use chaic_agents::PlannerRules;
 use chaic_agents::perception_factory::GROUND_TRUTH;
@@ -16,7 +19,7 @@ use chaic_eval::report::{Format, Report, write_files};
 use chaic_eval::run::{FolderMode, JobEvent, Run, RunRequest, Shard};
 use chaic_learn::helpers::PolicyRegistry;
 use chaic_sandbox::Isolation;
-use pyo3::exceptions::PyTypeError;
+use pyo3::exceptions::{PyTypeError, PyUserWarning};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use pythonize::depythonize;
@@ -115,16 +118,21 @@ struct Keywords {
     episodes: Option<PathBuf>,
     n_episodes: Option<u32>,
     seeds: Option<u32>,
-    rules: Option<chaic_env::rules::RuleSetName>,
+    rules: Option<String>,
     set: Vec<String>,
     traces: Option<bool>,
     perception: Option<String>,
     behavior: Option<String>,
-    track: Option<Track>,
+    track: Option<String>,
 }
 
 impl Keywords {
+    fn track(&self) -> PyResult<Option<Track>> {
+        self.track.as_deref().map(|name| name.parse().map_err(mistake)).transpose()
+    }
+
     fn request(self, helpers: Vec<String>) -> PyResult<RunRequest> {
+        let track = self.track()?;
         let tasks: Option<Result<Vec<_>, _>> =
             self.tasks.map(|tasks| tasks.iter().map(|task| task.parse()).collect());
         Ok(RunRequest {
@@ -134,12 +142,12 @@ impl Keywords {
             episodes: self.episodes,
             n_episodes: self.n_episodes,
             seeds: self.seeds,
-            rules: self.rules,
+            rules: self.rules.map(|name| name.parse().map_err(mistake)).transpose()?,
             rule_overrides: self.set,
             no_traces: self.traces == Some(false),
             perception: self.perception.filter(|name| name != GROUND_TRUTH),
             behavior: self.behavior.filter(|name| name != GROUND_TRUTH),
-            track: self.track,
+            track,
             ..RunRequest::default()
         })
     }
@@ -162,11 +170,22 @@ fn write_report(run: &Run) -> Result<String, EvalError> {
     Ok(if progress.finished > 0 { report.text(Format::Table) } else { String::new() })
 }
 
-/// Merges the shards of a run in a new folder; returns the report.
+/// Merges the shards of a run in a new folder; returns the report. Warns if episode runs are missing.
 #[pyfunction]
 pub fn merge(py: Python<'_>, out: PathBuf, runs: Vec<PathBuf>) -> PyResult<String> {
-    let merged = py.detach(|| write_report(&chaic_eval::run::merge(&out, &runs)?));
-    merged.map_err(failure)
+    let merged = py.detach(|| {
+        let run = chaic_eval::run::merge(&out, &runs)?;
+        let progress = run.progress();
+        Ok((write_report(&run)?, progress.total - progress.finished))
+    });
+    let (report, n_missing) = merged.map_err(|error| from_eval(&error))?;
+    if n_missing > 0 {
+        let problem =
+            format!("{n_missing} episode runs are missing; merge the other shards as well");
+        let problem = CString::new(problem).expect("the text has no zero byte");
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &problem, 1)?;
+    }
+    Ok(report)
 }
 
 /// Plays a run into a folder as `chaic eval` does, and returns the text of its report; `None` if it was stopped
@@ -195,7 +214,7 @@ pub fn evaluate(
     refuse_fork()?;
     let wrong = |error: pythonize::PythonizeError| PyTypeError::new_err(error.to_string());
     let mut keywords: Keywords = depythonize(options).map_err(wrong)?;
-    let track = keywords.track.unwrap_or_default();
+    let track = keywords.track()?.unwrap_or_default();
     keywords.perception = track.perception_or(keywords.perception);
     keywords.behavior = track.perception_or(keywords.behavior);
     let names: Vec<String> = helpers.iter().map(|(name, _)| name.clone()).collect();
@@ -226,11 +245,10 @@ pub fn evaluate(
     let access = if resume { FolderMode::Resume } else { FolderMode::New };
     let on_result = on_result.clone().unbind();
     let mut problem: Option<PyErr> = None;
-    let played = py.detach(|| {
+    let mut play = || {
         let (mut run, _) = Run::open(&out, access, &request, &helpers)?;
         let mut on_event = |event: &JobEvent| {
             let keeps_on = Python::attach(|py| {
-                py.check_signals()?;
                 let JobEvent::Finished(finished) = event else { return Ok(true) };
                 let key = &finished.result.key;
                 let tr = finished.result.summary().map(|s| s.done / s.total.max(f64::MIN_POSITIVE));
@@ -250,10 +268,44 @@ pub fn evaluate(
             return Ok(None);
         }
         write_report(&run).map(Some)
-    });
-    match (played, problem) {
+    };
+    let (played, interrupt) = py.detach(|| with_signals(stop, &mut play));
+    match (played, problem.or(interrupt)) {
         (_, Some(error)) => Err(error),
-        (Err(error), None) => Err(failure(error)),
+        (Err(error), None) => Err(from_eval(&error)),
         (Ok(text), None) => Ok(text),
     }
+}
+
+/// Calls a function in another thread, and meanwhile handles the signals of this one: Ctrl-C raises `stop`. Returns the
+/// result, and the exception of a signal.
+fn with_signals<T: Send>(
+    stop: &AtomicBool,
+    function: &mut (dyn FnMut() -> T + Send),
+) -> (T, Option<PyErr>) {
+    /// Interval of the checks.
+    const INTERVAL: Duration = Duration::from_millis(100);
+    let caller = thread::current();
+    let mut interrupt = None;
+    let result = thread::scope(|scope| {
+        let called = scope.spawn(move || {
+            let result = function();
+            caller.unpark();
+            result
+        });
+        while !called.is_finished() {
+            thread::park_timeout(INTERVAL);
+            if let Err(error) = Python::attach(|py| py.check_signals()) {
+                stop.store(true, Ordering::Relaxed);
+                interrupt.get_or_insert(error);
+            }
+        }
+        called.join()
+    });
+    (result.unwrap_or_else(|panic| std::panic::resume_unwind(panic)), interrupt)
+}
+
+/// Converts an error of a run.
+fn from_eval(error: &EvalError) -> PyErr {
+    if error.is_usage() { mistake(error) } else { failure(error) }
 }

@@ -57,7 +57,9 @@ impl IsolatedHelper {
         };
         let decision = Duration::try_from_secs_f64(options.decision_s).map_err(mistake)?;
         let default = Limits::default();
-        let limits = Limits { decision, episode: default.episode.max(decision), ..default };
+        // The limit applies to each call, as for helpers in this process.
+        let start = default.start.max(decision);
+        let limits = Limits { start, decision, episode: Duration::MAX, ..default };
         let create = |(name, line): (&String, &String)| {
             let confined = Confinement::new(&launcher, line, &limits, &confinement);
             let command = HelperProgram {

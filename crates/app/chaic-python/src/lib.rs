@@ -74,7 +74,7 @@ mod _chaic {
         module.add("__version__", chaic_env::CHAIC_VERSION)?;
         module.add("ACTIONS", super::action::ACTIONS)?;
         module.add("PROPRIOCEPTION", super::action::PROPRIOCEPTION)?;
-        module.add("PLAN", super::planning_agent::PLAN)?;
+        module.add("PLAN_FEATURES", super::planning_agent::PLAN_FEATURES)?;
         module.add("MAP", chaic_agents::memory::egocentric::CHANNELS)?;
         module.add("REWARD", super::reward::standard_weights())
     }

@@ -27,7 +27,7 @@ pub const CALLER: &str = "caller";
 struct Keywords {
     helper: String,
     partner: String,
-    rules: RuleSetName,
+    rules: String,
     set: Vec<String>,
     grants: Vec<String>,
     images: Vec<String>,
@@ -44,7 +44,7 @@ impl Default for Keywords {
         Keywords {
             helper: CALLER.to_owned(),
             partner: helper_registry::RULES.to_owned(),
-            rules: RuleSetName::Paper,
+            rules: RuleSetName::Paper.to_string(),
             set: Vec::new(),
             grants: Vec::new(),
             images: vec!["rgb".to_owned(), "depth".to_owned()],
@@ -80,12 +80,8 @@ impl Options {
         let wrong = |error: pythonize::PythonizeError| PyTypeError::new_err(error.to_string());
         let keywords: Keywords =
             keywords.map(|k| depythonize(k).map_err(wrong)).transpose()?.unwrap_or_default();
-        let mut rules = RuleSet::named(keywords.rules);
-        for setting in &keywords.set {
-            rules = rules.with(setting).map_err(|error| from_env(&error))?;
-        }
         let options = Options {
-            rules,
+            rules: rule_set(&keywords.rules, &keywords.set)?,
             sensors: sensors(&keywords.images, keywords.image_size)?,
             grants: grants(&keywords.grants)?,
             appearance: keywords.appearance.parse().map_err(mistake)?,
@@ -147,6 +143,15 @@ impl Options {
         };
         Ok(EpisodeAgents { helper, partner })
     }
+}
+
+/// Returns a rule set with changes such as `planner.max_failed_lifts=2`.
+///
+/// # Errors
+/// `ValueError` for an unknown rule set or an invalid change.
+pub fn rule_set(name: &str, set: &[String]) -> PyResult<RuleSet> {
+    let rules = RuleSet::named(name.parse().map_err(mistake)?);
+    set.iter().try_fold(rules, |rules, setting| rules.with(setting)).map_err(|e| from_env(&e))
 }
 
 /// Warns of keywords that have a new name.

@@ -11,7 +11,6 @@ use chaic_core::geom::rotate_yaw;
 use chaic_core::observation::{Grants, SensorConfig};
 use chaic_core::{Agent, AgentError};
 use chaic_env::helper_registry::{self, BuiltInWithPerception, Helper};
-use chaic_env::rules::RuleSet;
 use chaic_learn::helpers::PolicyRegistry;
 use chaic_subprocess::message::SensorRequest;
 use chaic_vision::trained::TrainedDetector;
@@ -22,10 +21,30 @@ use pyo3::types::{PyDict, PyList};
 use crate::action::to_object;
 use crate::error::{failure, from_env, mistake, no_attribute, no_such, poisoned};
 use crate::observation::{Briefing, Observation, plain};
-use crate::options::{perception, sensors};
+use crate::options::{perception, rule_set, sensors};
 
-fn planner_rules() -> PlannerRules {
-    RuleSet::PAPER.planner
+/// Returns the planner rules of a rule set with changes.
+///
+/// # Errors
+/// `ValueError` for an unknown rule set or an invalid change.
+fn planner_rules(rules: &str, set: &[String]) -> PyResult<PlannerRules> {
+    Ok(rule_set(rules, set)?.planner)
+}
+
+/// Refuses behavior recognition from images: the worlds of this package record no frame history for it.
+fn check_history(sensors: SensorConfig) -> PyResult<()> {
+    match sensors.frame_history {
+        None => Ok(()),
+        Some(_) => Err(mistake(
+            "behavior=\"learned\" needs images between decisions, which only helpers inside a world get: \
+             World(..., helper=NAME, behavior=\"learned\")",
+        )),
+    }
+}
+
+/// Error of an agent that was not briefed.
+fn not_reset() -> PyErr {
+    failure("call reset(briefing) first")
 }
 
 /// Returns the names of grants.
@@ -38,25 +57,33 @@ fn names(grants: Grants) -> Vec<&'static str> {
 pub struct PlanningAgent {
     agent: Mutex<Box<dyn Agent>>,
     grants: Grants,
+    is_reset: bool,
 }
 
 #[pymethods]
 impl PlanningAgent {
     /// Creates a helper by name, such as `"rhp"`. `perception` is ground truth (`"gt"`), the detector (`"learned"`,
     /// `"learned:FILE"`) or simulated detector errors (`"noisy"`, `"noisy:FILE"`). `behavior` recognizes actions of
-    /// others by grants (`"gt"`) or the behavior network (`"learned"`, `"learned:FILE"`).
+    /// others by grants (`"gt"`). `rules` and `set` are as in `World`.
     #[new]
-    #[pyo3(signature = (name, perception="gt", behavior="gt"))]
-    fn new(name: &str, perception: &str, behavior: &str) -> PyResult<PlanningAgent> {
+    #[pyo3(signature = (name, perception="gt", behavior="gt", *, rules="paper", set=Vec::new()))]
+    fn new(
+        name: &str,
+        perception: &str,
+        behavior: &str,
+        rules: &str,
+        set: Vec<String>,
+    ) -> PyResult<PlanningAgent> {
         let perception = self::perception(perception, behavior)?;
         let built_in = BuiltInWithPerception { perception: Arc::clone(&perception) };
         let helpers = PolicyRegistry::bundled(&built_in, perception);
-        let found =
-            helper_registry::find(&helpers, name, planner_rules()).map_err(|e| from_env(&e))?;
+        let rules = planner_rules(rules, &set)?;
+        let found = helper_registry::find(&helpers, name, rules).map_err(|e| from_env(&e))?;
         let Some(Helper { agent, grants }) = found else {
             return Err(mistake("\"none\" is not a helper"));
         };
-        Ok(PlanningAgent { agent: Mutex::new(agent), grants })
+        check_history(agent.sensors())?;
+        Ok(PlanningAgent { agent: Mutex::new(agent), grants, is_reset: false })
     }
 
     /// Required grants.
@@ -68,6 +95,7 @@ impl PlanningAgent {
     /// Starts an episode.
     fn reset(&mut self, briefing: &Bound<'_, Briefing>) -> PyResult<()> {
         self.agent.get_mut().map_err(poisoned)?.reset(&briefing.get().0);
+        self.is_reset = true;
         Ok(())
     }
 
@@ -82,6 +110,9 @@ impl PlanningAgent {
         py: Python<'py>,
         observation: &Bound<'py, Observation>,
     ) -> PyResult<Bound<'py, PyAny>> {
+        if !self.is_reset {
+            return Err(not_reset());
+        }
         let agent = self.agent.get_mut().map_err(poisoned)?;
         let observation = &observation.get().0;
         let action = py.detach(|| agent.act(observation)).map_err(failure)?;
@@ -101,7 +132,7 @@ impl PlanningAgent {
 
 /// Elements of a plan vector: one-hot kind (`Plan::KINDS`), class index of the plan's object (-1 for none), and its
 /// position in the body frame, meters to the right and ahead (0 for none).
-pub const PLAN: [&str; N_KINDS + 3] = {
+pub const PLAN_FEATURES: [&str; N_KINDS + 3] = {
     let mut names = ["class"; N_KINDS + 3];
     let mut k = 0;
     while k < N_KINDS {
@@ -114,9 +145,9 @@ pub const PLAN: [&str; N_KINDS + 3] = {
 };
 const N_KINDS: usize = Plan::KINDS.len();
 
-fn plan_vector(plan: &Plan, memory: &Memory) -> [f32; PLAN.len()] {
+fn plan_vector(plan: &Plan, memory: &Memory) -> [f32; PLAN_FEATURES.len()] {
     let subject = plan.subject();
-    let mut vector = [0.0; PLAN.len()];
+    let mut vector = [0.0; PLAN_FEATURES.len()];
     vector[plan.kind()] = 1.0;
     vector[N_KINDS] = subject.map_or(-1.0, |it| it.class.index() as f32);
     if let Some(object) = subject.and_then(|it| memory.objects.get(it.track)) {
@@ -140,6 +171,14 @@ impl Planner {
         self.agent.get_mut().map_err(poisoned)
     }
 
+    /// Returns the agent of a running episode.
+    fn briefed_agent(&mut self) -> PyResult<&mut CorePlanningAgent<ExternalPolicy>> {
+        if self.briefing.is_none() {
+            return Err(not_reset());
+        }
+        self.agent()
+    }
+
     /// Returns the next action; `None` if the caller must choose a plan first.
     fn next_action<'py>(&mut self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let agent = self.agent()?;
@@ -153,16 +192,24 @@ impl Planner {
 
 #[pymethods]
 impl Planner {
-    /// Creates a planner with images of this size; `perception` and `behavior` are as in `PlanningAgent`. Ground truth
-    /// (`"gt"`) needs the grant `"ids"`.
+    /// Creates a planner with images of this size; `perception`, `behavior`, `rules` and `set` are as in
+    /// `PlanningAgent`. Ground truth (`"gt"`) needs the grant `"ids"`.
     #[new]
-    #[pyo3(signature = (perception="gt", image_size=512, behavior="gt"))]
-    fn new(perception: &str, image_size: u32, behavior: &str) -> PyResult<Planner> {
+    #[pyo3(signature = (perception="gt", image_size=512, behavior="gt", *, rules="paper", set=Vec::new()))]
+    fn new(
+        perception: &str,
+        image_size: u32,
+        behavior: &str,
+        rules: &str,
+        set: Vec<String>,
+    ) -> PyResult<Planner> {
         let perception = self::perception(perception, behavior)?;
         sensors(&[], image_size)?;
         perception.check_image_size(image_size).map_err(mistake)?;
         let policy = ExternalPolicy::default();
-        let agent = CorePlanningAgent::with_perception(policy, planner_rules(), &*perception);
+        let rules = planner_rules(rules, &set)?;
+        let agent = CorePlanningAgent::with_perception(policy, rules, &*perception);
+        check_history(agent.sensors())?;
         let sensors = SensorConfig { image_size, ..agent.sensors() };
         let agent = Mutex::new(agent.with_sensors(sensors));
         Ok(Planner { agent, grants: perception.grants(Grants::PLANNER), briefing: None })
@@ -191,21 +238,21 @@ impl Planner {
 
     /// Processes an observation; returns the next action of the current plan, or `None` if the caller must choose a
     /// plan (`plans`, `choose`).
-    fn attend<'py>(
+    fn act<'py>(
         &mut self,
         py: Python<'py>,
         observation: &Bound<'py, Observation>,
     ) -> PyResult<Option<Bound<'py, PyAny>>> {
         let observation = &observation.get().0;
-        let agent = self.agent()?;
+        let agent = self.briefed_agent()?;
         py.detach(|| agent.observe(observation));
         self.next_action(py)
     }
 
     /// Updates the memory from an observation, without a decision.
-    fn look(&mut self, py: Python<'_>, observation: &Bound<'_, Observation>) -> PyResult<()> {
+    fn observe(&mut self, py: Python<'_>, observation: &Bound<'_, Observation>) -> PyResult<()> {
         let observation = &observation.get().0;
-        let agent = self.agent()?;
+        let agent = self.briefed_agent()?;
         py.detach(|| agent.observe(observation));
         Ok(())
     }
@@ -215,8 +262,8 @@ impl Planner {
         Ok(self.agent()?.policy().valid().iter().map(ToString::to_string).collect())
     }
 
-    /// Returns the valid plans as vectors (`PLAN`), float32 [plans, 14].
-    fn plan_numbers<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    /// Returns the valid plans as vectors (`PLAN_FEATURES`), float32 [plans, 14].
+    fn plan_features<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let agent = self.agent()?;
         let rows: Vec<Vec<f32>> = match agent.memory() {
             Some(memory) => {
@@ -226,7 +273,7 @@ impl Planner {
             None => Vec::new(),
         };
         if rows.is_empty() {
-            return PyArray1::from_vec(py, Vec::new()).reshape([0, PLAN.len()]);
+            return PyArray1::from_vec(py, Vec::new()).reshape([0, PLAN_FEATURES.len()]);
         }
         PyArray2::from_vec2(py, &rows).map_err(failure)
     }
@@ -267,9 +314,20 @@ impl Planner {
         self.next_action(py)
     }
 
+    /// Raises `AttributeError`; the message names the new name of a renamed method.
+    fn __getattr__(&self, name: &str) -> PyResult<Py<PyAny>> {
+        const RENAMED: [(&str, &str); 4] = [
+            ("attend", "act"),
+            ("look", "observe"),
+            ("plan_numbers", "plan_features"),
+            ("things", "remembered_objects"),
+        ];
+        Err(no_attribute("Planner", name, &RENAMED))
+    }
+
     /// Returns the remembered objects: `name`, `class`, `position` in the world (meters), `last_seen` (frame), and
     /// `is_present` by current knowledge.
-    fn things<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+    fn remembered_objects<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let list = PyList::empty(py);
         let Some(memory) = self.agent()?.memory() else { return Ok(list) };
         for object in memory.objects.iter() {

@@ -16,7 +16,7 @@ use pythonize::depythonize;
 
 use crate::action;
 use crate::episode::{Episode, encode_png};
-use crate::error::{failure, from_env, mistake, poisoned};
+use crate::error::{failure, from_env, mistake, no_attribute, poisoned};
 use crate::observation::{Briefing, Observation, arrays, plain};
 use crate::options::{Options, sensors};
 use crate::threads::detached;
@@ -43,8 +43,8 @@ pub fn score<'py>(py: Python<'py>, env: &Env) -> PyResult<Bound<'py, PyAny>> {
     let end = env.score();
     let score = PyDict::new(py);
     score.set_item("frame", end.frame)?;
-    score.set_item("done", end.done)?;
-    score.set_item("total", end.total)?;
+    score.set_item("delivered", end.done)?;
+    score.set_item("wanted", end.total)?;
     score.set_item("complete", end.complete)?;
     Ok(score.into_any())
 }
@@ -222,7 +222,11 @@ impl World {
     /// Returns the proprioception (`PROPRIOCEPTION`) of an agent that needs an action, and the mask of `ACTIONS` that
     /// its hands allow.
     #[pyo3(signature = (agent=1))]
-    fn own<'py>(&mut self, py: Python<'py>, agent: u8) -> PyResult<ProprioceptionArrays<'py>> {
+    fn proprioception<'py>(
+        &mut self,
+        py: Python<'py>,
+        agent: u8,
+    ) -> PyResult<ProprioceptionArrays<'py>> {
         let id = self.agent(agent)?;
         let env = self.env()?;
         let horizon = env.world().setup().horizon.max(1) as f32;
@@ -242,7 +246,7 @@ impl World {
         reward(py, self.env()?.reward(id))
     }
 
-    /// Returns the score so far: `frame`, `done`, `total`, `complete`; TR is `done / total`.
+    /// Returns the score so far: `frame`, `delivered`, `wanted`, `complete`; TR is `delivered / wanted`.
     fn score<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         score(py, self.env()?)
     }
@@ -276,7 +280,7 @@ impl World {
         Ok(())
     }
 
-    /// Renders the view of an agent or a camera (a dictionary as `Observation.camera`). Returns arrays by name: `rgb`,
+    /// Renders the view of an agent, by default the helper, or of a camera (a dictionary as `Observation.camera`). Returns arrays by name: `rgb`,
     /// `depth`, `ids`. The method ignores grants; agents use `observe`.
     #[pyo3(signature = (agent=None, camera=None, image_size=512, images=None))]
     fn render<'py>(
@@ -290,7 +294,10 @@ impl World {
         let kinds = images.unwrap_or_else(|| vec!["rgb".to_owned()]);
         let sensors = sensors(&kinds, image_size)?;
         let channels = Channels::from(sensors);
-        let id = self.agent(agent.unwrap_or(0))?;
+        if agent.is_some() && camera.is_some() {
+            return Err(mistake("give an agent or a camera"));
+        }
+        let id = self.agent(agent.unwrap_or(AgentId::HELPER.0))?;
         let env = self.env()?;
         let view = match camera {
             Some(camera) => {
@@ -319,7 +326,11 @@ impl World {
 
     /// Draws the top view, uint8 [height, width, 3].
     #[pyo3(signature = (width=640))]
-    fn plan<'py>(&mut self, py: Python<'py>, width: u32) -> PyResult<Bound<'py, PyArray3<u8>>> {
+    fn floor_plan<'py>(
+        &mut self,
+        py: Python<'py>,
+        width: u32,
+    ) -> PyResult<Bound<'py, PyArray3<u8>>> {
         if !(16..=8192).contains(&width) {
             return Err(mistake(format!("width is {width}, expected 16 to 8192")));
         }
@@ -338,7 +349,12 @@ impl World {
 
     /// Returns the picture for notebooks, as PNG.
     fn _repr_png_<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        encode_png(py, self.plan(py, 640)?.readonly())
+        encode_png(py, self.floor_plan(py, 640)?.readonly())
+    }
+
+    /// Raises `AttributeError`; the message names the new name of a renamed method.
+    fn __getattr__(&self, name: &str) -> PyResult<Py<PyAny>> {
+        Err(no_attribute("World", name, &[("own", "proprioception"), ("plan", "floor_plan")]))
     }
 
     fn __repr__(&mut self) -> PyResult<String> {

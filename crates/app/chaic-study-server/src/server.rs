@@ -144,7 +144,7 @@ impl StudyServer {
     }
 }
 
-/// Returns whether a helper runs in this process.
+/// Returns whether a helper follows rules in this process. Others may wait for a process of their own.
 fn is_built_in(name: &str) -> bool {
     name == NONE || BuiltInHelpers.names().iter().any(|known| known == name)
 }

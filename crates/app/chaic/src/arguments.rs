@@ -91,7 +91,7 @@ pub enum Command {
     /// Play a benchmark, or evaluate a network.
     #[command(
         long_about = "Play a benchmark, or evaluate a network. Without options it plays a small, \
-                      complete benchmark of about half a minute."
+                      complete benchmark of about a minute."
     )]
     Eval(Box<EvalCommand>),
     /// Join the shards of a run.
@@ -143,10 +143,10 @@ pub enum Command {
     #[command(subcommand)]
     Export(ExportCommand),
 
-    /// Replay a run and compare its states, results and report.
+    /// Simulate the recorded actions of a run again, and compare states, results and report.
     #[command(
-        long_about = "Replay a run and compare its states, results and report. The exit code is 1 \
-                      if something differs or is missing."
+        long_about = "Simulate the recorded actions of a run again, and compare states, results and \
+                      report. The exit code is 1 if something differs or is missing."
     )]
     Verify(VerifyArguments),
     /// Compare both rule sets with the published results; docs/reference/fidelity.md.

@@ -108,7 +108,8 @@ pub enum AgentError {
 /// ends.
 ///
 /// It receives all information through [`Agent::reset`], [`Agent::act`] and [`Agent::observe`]. Equal
-/// sequences of calls must lead to equal actions: draw random numbers from a [`crate::rng::RngStream`] seeded by the briefing.
+/// sequences of calls must lead to equal actions: draw random numbers from a
+/// [`crate::rng::RngStream`] seeded by the briefing.
 pub trait Agent: Send {
     /// Returns the required sensors; called once per episode, after [`Agent::reset`]. Only required
     /// channels are rendered, and only granted ones are provided.
@@ -123,8 +124,8 @@ pub trait Agent: Send {
     /// If the agent fails; it is not called again in this episode.
     fn act(&mut self, observation: &Observation) -> Result<Action, AgentError>;
 
-    /// Updates the memory in a turn in which a recording decides for this body. An agent that takes over is
-    /// asked by [`Agent::act`] from then on; without this method it knows nothing of the turns before.
+    /// Updates the memory while a recording chooses this agent's actions. From the takeover on,
+    /// [`Agent::act`] is called. Without this method the agent knows nothing of earlier turns.
     fn observe(&mut self, _observation: &Observation) {}
 
     /// Returns the name of the perception model, if the agent uses an exchangeable one instead of

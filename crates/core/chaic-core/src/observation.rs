@@ -394,7 +394,7 @@ pub struct ObjectState {
     pub container: Option<EntityId>,
     /// True if the object is out of play: delivered, or broken.
     #[serde(default, skip_serializing_if = "is_false")]
-    pub is_out_of_play: bool,
+    pub is_gone: bool,
 }
 
 impl ObjectState {
@@ -484,6 +484,37 @@ mod tests {
         let history =
             Some(FrameHistorySpec { image_size: history_image_size, every_frames: 3, max_len });
         SensorConfig { image_size, rgb: true, depth: true, ids: true, frame_history: history }
+    }
+
+    /// `docs/subprocess-helpers.md` lists these keys for programs in other languages.
+    #[test]
+    fn a_granted_object_has_the_documented_keys() {
+        let object = ObjectState {
+            entity: EntityId(7),
+            class: ClassId::named("apple"),
+            position_in_world: Vec3::ZERO,
+            bottom_m: 0.0,
+            top_m: 0.0,
+            footprint: Vec::new(),
+            holder: Some(AgentId::HELPER),
+            container: Some(EntityId(8)),
+            is_gone: true,
+        };
+        let value = serde_json::to_value(object).unwrap();
+        let mut keys: Vec<&String> = value.as_object().unwrap().keys().collect();
+        keys.sort();
+        let expected = [
+            "bottom_m",
+            "class",
+            "container",
+            "entity",
+            "footprint",
+            "holder",
+            "is_gone",
+            "position_in_world",
+            "top_m",
+        ];
+        assert_eq!(keys, expected);
     }
 
     #[test]

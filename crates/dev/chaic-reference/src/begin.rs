@@ -23,7 +23,7 @@ impl Turn<'_> {
             Err(FailureReason::OutOfReach)
         };
         let is_taking = matches!(action, Action::PickUp { .. } | Action::RemoveObstacle { .. });
-        let refusal_frames = if is_taking { self.facts.numbers.refused_pick } else { 1 };
+        let refusal_frames = if is_taking { self.facts.numbers.refused_pick_up } else { 1 };
         let (parts, failing) = match plan {
             Ok(parts) => (parts, None),
             Err(reason) => (vec![Part::Stand(refusal_frames)], Some(reason)),

@@ -229,7 +229,7 @@ impl Turn<'_> {
             Part::Arms(n.reach),
             Part::Stand(n.gap),
             Part::Arms(n.reach),
-            drop(objects[0], on, n.watch_fall),
+            drop(objects[0], on, n.max_fall_wait),
             Part::Arms(if is_rider { n.reach } else { n.return_arms }),
         ]);
         Step::Skips
@@ -241,7 +241,7 @@ impl Turn<'_> {
         self.person_mut(agent).n_put_in += 1;
         let index = u64::from(agent.0) << 32 | u64::from(count);
         let mut stream = RngStream::new(self.facts.setup.seed, "watch put in", index);
-        stream.below(self.facts.numbers.watch_put_in as usize + 1) as u32
+        stream.below(self.facts.numbers.max_put_in_wait as usize + 1) as u32
     }
 
     /// Puts an object from a hand into the first free slot of a container or basket.

@@ -51,6 +51,9 @@ pub enum ArenaError {
         /// Version of chaic in the commitment.
         sealed_by: String,
     },
+    /// The folder of a split holds episodes that are not of the split.
+    #[error("{} holds other episodes; choose another folder, or remove them", .0.display())]
+    UnknownFiles(PathBuf),
     /// An archive, or a folder to pack, breaks a rule of archives.
     #[error("{path} is refused: {problem}", path = path.display())]
     Archive {

@@ -1,6 +1,7 @@
 //! Episodes that follow from a secret, and the public commitment to them.
 
-use std::path::Path;
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use chaic_core::TaskId;
@@ -8,7 +9,7 @@ use chaic_env::partner_suite::{MAX_PARTNERS, PartnerSuite, SuitePartner};
 use chaic_episodes::{
     Episode, GenerateError, GeneratorSeeds, SeedRange, Settings, generate_episode,
 };
-use chaic_files::{create_folders, write_atomically};
+use chaic_files::{create_folders, entries, write_atomically};
 use hkdf::Hkdf;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -220,6 +221,32 @@ impl SealedSplit {
         generate_episode(id, split, task, seeds, Settings::STANDARD)
     }
 
+    /// Returns the name of the file of an episode.
+    fn file_name(task: TaskId, k: usize) -> String {
+        format!("{task}-{k:03}.json")
+    }
+
+    /// Refuses a folder with episodes that do not belong to the split, such as those of a larger one. They
+    /// would be played with it.
+    fn check_folder(&self, folder: &Path) -> Result<(), ArenaError> {
+        let of_task = |task: &TaskId| {
+            let task = *task;
+            (0..self.n_episodes).map(move |k| SealedSplit::file_name(task, k))
+        };
+        let expected: HashSet<String> = self.tasks.iter().flat_map(of_task).collect();
+        let is_other = |path: &PathBuf| {
+            path.extension().is_some_and(|extension| extension == "json")
+                && path
+                    .file_name()
+                    .and_then(|name| name.to_str())
+                    .is_none_or(|name| !expected.contains(name))
+        };
+        match entries(folder)?.iter().any(is_other) {
+            true => Err(ArenaError::UnknownFiles(folder.to_owned())),
+            false => Ok(()),
+        }
+    }
+
     /// Writes each episode to a file `TASK-NNN.json` of a folder, and returns the commitment. Returns
     /// `None` if `stop` is raised. `progress` is called after each episode.
     ///
@@ -232,6 +259,7 @@ impl SealedSplit {
         progress: &mut dyn FnMut(),
     ) -> Result<Option<Commitment>, ArenaError> {
         create_folders(folder)?;
+        self.check_folder(folder)?;
         let mut digest = Sha256::new();
         for task in &self.tasks {
             for k in 0..self.n_episodes {
@@ -241,7 +269,7 @@ impl SealedSplit {
                 let episode = self.episode(*task, k)?;
                 digest.update(episode.to_json_line());
                 digest.update("\n");
-                let path = folder.join(format!("{task}-{k:03}.json"));
+                let path = folder.join(SealedSplit::file_name(*task, k));
                 write_atomically(&path, episode.to_json().as_bytes())?;
                 progress();
             }

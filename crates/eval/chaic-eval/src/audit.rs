@@ -59,7 +59,7 @@ pub enum PartnerMode {
 pub struct RunPair<'a> {
     /// The episode.
     pub episode: &'a Episode,
-    /// HiddenProperty that differs between the two runs.
+    /// Hidden property that differs between the two runs.
     pub secret: HiddenProperty,
     /// Behavior of the partner.
     pub partner: PartnerMode,
@@ -172,7 +172,7 @@ fn difference(a: &RecordedDecision, b: &RecordedDecision) -> Option<&'static str
 fn is_disclosed(pair: &RunPair<'_>, part: &str, a: &Observation, b: &Observation) -> bool {
     let undisclosed = |o: &Observation| {
         let mut granted = o.granted.clone();
-        if pair.rules.world.tells_removed {
+        if pair.rules.world.announces_removed_obstacles {
             granted.removed.clear();
         }
         let sees_partner = granted.classes.iter().any(|(e, _)| e.agent() == Some(AgentId::PARTNER));

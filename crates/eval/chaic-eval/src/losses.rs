@@ -21,7 +21,7 @@ const BOUND: &str = "oracle_plan";
 /// Reference helper with only the state granted.
 const WITH_STATE: &str = "ideal_observer";
 /// Reference helper with only the goal granted.
-const WITH_GOAL: &str = "infer_told";
+const WITH_GOAL: &str = "infer_known_goal";
 /// Reference helper with neither.
 const WITHOUT: &str = "infer";
 

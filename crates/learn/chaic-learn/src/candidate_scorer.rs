@@ -148,15 +148,17 @@ impl CandidateScorer {
     }
 
     /// Updates the running statistics that normalize later inputs. Before the first update inputs
-    /// are not changed.
+    /// are not changed. The last `n_raw` features of candidates are never changed.
     pub fn update_normalizer<'a>(
         &self,
         parameters: &mut [f32],
         decisions: impl Iterator<Item = &'a CandidateSet> + Clone,
+        n_raw: usize,
     ) {
         let states = decisions.clone().map(|d| &d.state[..]);
         self.normalizer.update_running_stats(parameters, 0, 0, states);
         let candidates = decisions.flat_map(|d| d.candidates.chunks_exact(self.n_candidate));
+        let candidates = candidates.map(|row| &row[..self.n_candidate - n_raw]);
         self.normalizer.update_running_stats(parameters, self.n_state, 1, candidates);
     }
 
@@ -300,8 +302,8 @@ mod tests {
             })
             .collect();
         // Two updates have the same effect as one.
-        model.update_normalizer(&mut parameters, all[..1].iter());
-        model.update_normalizer(&mut parameters, all[1..].iter());
+        model.update_normalizer(&mut parameters, all[..1].iter(), 0);
+        model.update_normalizer(&mut parameters, all[1..].iter(), 0);
         let rows = model.rows(&parameters, all.iter());
         let states: Vec<f64> = rows.data.chunks(5).map(|row| f64::from(row[0])).collect();
         // The row of the state alone and the rows of its candidates hold the same state. The

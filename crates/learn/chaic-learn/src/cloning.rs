@@ -138,7 +138,9 @@ impl Policy for ExpertPolicy {
             }
             (RolloutActor::Learner(learner), None) => learner.choose(context, valid)?,
             (RolloutActor::Expert(features), _) => {
-                features.record(expert_plan, action, frame);
+                // The learner's history has the plan that the agent executes.
+                let adopted = reconsidered.filter(|_| continues).unwrap_or(expert_plan);
+                features.record(adopted, action, frame);
                 expert_plan
             }
         };

@@ -164,7 +164,7 @@ pub struct OptionalInputs {
     /// Opponent model whose predictions are added.
     pub opponent: Option<Arc<OpponentModel>>,
     /// True to mark the plan that the helper `infer` would choose.
-    pub has_proposals: bool,
+    pub has_infer_hint: bool,
     /// Number of earlier decisions.
     pub memory: usize,
 }
@@ -176,7 +176,7 @@ impl FeatureEncoder {
             history: PlanHistory::default(),
             episode: None,
             opponent: inputs.opponent.map(OpponentTracker::new),
-            proposer: inputs.has_proposals.then(|| InferPolicy::new(InferOptions::ALL)),
+            proposer: inputs.has_infer_hint.then(|| InferPolicy::new(InferOptions::ALL)),
             memory: DecisionMemory::new(inputs.memory),
         }
     }

@@ -12,7 +12,7 @@ const IDLE_FRAMES: Frame = 60;
 /// Minimum time between reconsiderations of walks to objects, frames: as above.
 const WALK_FRAMES: Frame = 80;
 /// Minimum time between reconsiderations while the child is away, or of walks to furniture, frames:
-/// that of the rules (`planner.time.reconsider_frames`).
+/// that of the rules (`planner.time.replan_interval_frames`).
 const URGENT_FRAMES: Frame = 40;
 
 /// History of a policy's choices.

@@ -151,8 +151,8 @@ impl Policy for LearnedPolicy {
         Ok(self.choose_among(&candidates, observation, frame))
     }
 
-    fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, is_news: bool) -> bool {
-        self.features.history.begin_reconsideration(context, current, is_news)
+    fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, has_changed: bool) -> bool {
+        self.features.history.begin_reconsideration(context, current, has_changed)
     }
 
     fn supersedes(&self, new: &Plan, current: &Plan) -> bool {

@@ -26,7 +26,7 @@ pub struct PolicyKind {
     /// Predictions of an opponent model (Smart-Help).
     pub opponent: OpponentInput,
     /// True if one feature marks the plan that the helper `infer` would choose.
-    pub has_proposals: bool,
+    pub has_infer_hint: bool,
     /// Number of earlier decisions that the network reads, 0 to [`MAX_MEMORY`].
     pub memory: usize,
 }
@@ -34,13 +34,13 @@ pub struct PolicyKind {
 impl PolicyKind {
     /// No further inputs.
     pub const PLAIN: PolicyKind =
-        PolicyKind { opponent: OpponentInput::None, has_proposals: false, memory: 0 };
+        PolicyKind { opponent: OpponentInput::None, has_infer_hint: false, memory: 0 };
 
     /// Returns all kinds.
     fn all() -> impl Iterator<Item = PolicyKind> {
         OpponentInput::ALL.into_iter().flat_map(|opponent| {
-            [false, true].into_iter().flat_map(move |has_proposals| {
-                (0..=MAX_MEMORY).map(move |memory| PolicyKind { opponent, has_proposals, memory })
+            [false, true].into_iter().flat_map(move |has_infer_hint| {
+                (0..=MAX_MEMORY).map(move |memory| PolicyKind { opponent, has_infer_hint, memory })
             })
         })
     }
@@ -51,7 +51,7 @@ impl PolicyKind {
             OpponentInput::None => (N_STATE, N_PLAN),
             _ => (N_STATE + N_OPPONENT_STATE, N_PLAN + N_OPPONENT_PLAN),
         };
-        let n_proposal = if self.has_proposals { N_PROPOSAL_PLAN } else { 0 };
+        let n_proposal = if self.has_infer_hint { N_PROPOSAL_PLAN } else { 0 };
         let n_memory = if self.memory > 0 { N_MEMORY_PLAN } else { 0 };
         (n_state, n_plan + n_proposal + n_memory)
     }
@@ -69,7 +69,7 @@ impl PolicyKind {
 
     /// Name in weights files.
     pub fn name(self) -> String {
-        let proposals = if self.has_proposals { ", proposals of infer" } else { "" };
+        let proposals = if self.has_infer_hint { ", proposals of infer" } else { "" };
         let memory = match self.memory {
             0 => String::new(),
             n => format!(", memory of {n} decisions"),
@@ -125,9 +125,9 @@ impl PolicyWeights {
 
     /// Creates an encoder of the network's inputs.
     pub fn encoder(&self) -> FeatureEncoder {
-        let PolicyKind { has_proposals, memory, .. } = self.kind;
+        let PolicyKind { has_infer_hint, memory, .. } = self.kind;
         let opponent = self.opponent.clone();
-        FeatureEncoder::new(OptionalInputs { opponent, has_proposals, memory })
+        FeatureEncoder::new(OptionalInputs { opponent, has_infer_hint, memory })
     }
 
     /// Returns the grants of a helper with this policy: those of the paper's helpers, and the

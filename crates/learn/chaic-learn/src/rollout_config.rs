@@ -4,14 +4,14 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
 
-use chaic_agents::partners::{PARTNER_VARIANTS, PartnerVariant};
+use chaic_agents::partners::{PARTNER_VARIANTS, partner_habits};
 use chaic_agents::perception_factory::{GROUND_TRUTH, PerceptionFactory};
 use chaic_core::TaskId;
 use chaic_core::rng::RngStream;
 use chaic_env::RewardWeights;
 use chaic_env::helper_registry::{RULES, built_in};
 use chaic_env::rules::RuleSet;
-use chaic_episodes::SeedRange;
+use chaic_episodes::{SeedRange, find_episode};
 use chaic_files::read_user_file;
 use chaic_training::bounds::{Bound, BoundTable, integer, real};
 use chaic_training::{Metrics, TrainingError, metrics};
@@ -35,7 +35,7 @@ pub(crate) const ROLLOUT_BOUNDS: BoundTable = &[
     // All decisions of an iteration's episodes are kept: about 0.3 MB per episode.
     ("episodes", integer(1, 4096)),
     ("image_size", integer(16, 1024)),
-    ("memory", integer(0, MAX_MEMORY as i64)),
+    ("n_past_decisions", integer(0, MAX_MEMORY as i64)),
     ("validation_episodes", integer(1, MAX_VALIDATION_EPISODES)),
     ("rewards", Bound::Table(REWARD_BOUNDS)),
 ];
@@ -78,9 +78,11 @@ pub struct RolloutConfig {
     /// any.
     pub opponent: Option<PathBuf>,
     /// Adds a feature that marks the plan that the helper `infer` would choose.
-    pub proposals: bool,
+    #[serde(alias = "proposals")]
+    pub infer_hint: bool,
     /// Number of earlier decisions that the policy reads.
-    pub memory: usize,
+    #[serde(alias = "memory")]
+    pub n_past_decisions: usize,
     /// Normalizes inputs by their running mean and standard deviation.
     pub normalize: bool,
     /// Validation episodes per task.
@@ -101,8 +103,8 @@ impl Default for RolloutConfig {
             perception: GROUND_TRUTH.to_owned(),
             behavior: GROUND_TRUTH.to_owned(),
             opponent: None,
-            proposals: false,
-            memory: 0,
+            infer_hint: false,
+            n_past_decisions: 0,
             normalize: false,
             validation_episodes: 3,
             rewards: RewardWeights::CUMULATIVE,
@@ -116,11 +118,13 @@ impl RolloutConfig {
             return Err("`rollout.tasks` is empty".to_owned());
         }
         check_splits("rollout.splits", &self.splits)?;
-        let is_known = |name: &&String| *name == RULES || PartnerVariant::find(name).is_some();
+        let is_known = |name: &&String| *name == RULES || partner_habits(name).is_ok();
         if let Some(name) = self.partners.iter().find(|name| !is_known(name)) {
             let names: Vec<&str> = PARTNER_VARIANTS.iter().map(|v| v.name).collect();
             let names = names.join(", ");
-            return Err(format!("`rollout.partners` has `{name}`, expected {RULES}, {names}"));
+            return Err(format!(
+                "`rollout.partners` has `{name}`, expected {RULES}, {names}, drawn:SEED or habits:..."
+            ));
         }
         if self.partners.is_empty() {
             return Err("`rollout.partners` is empty".to_owned());
@@ -138,7 +142,7 @@ impl RolloutConfig {
     /// Returns the inputs of a policy with this opponent model.
     pub(crate) fn policy_kind(&self, opponent: Option<&OpponentModel>) -> PolicyKind {
         let opponent = OpponentInput::from_model(opponent);
-        PolicyKind { opponent, has_proposals: self.proposals, memory: self.memory }
+        PolicyKind { opponent, has_infer_hint: self.infer_hint, memory: self.n_past_decisions }
     }
 
     pub(crate) fn perception_factory(&self) -> Result<Arc<dyn PerceptionFactory>, PerceptionError> {
@@ -165,13 +169,38 @@ impl RolloutConfig {
                 let task = self.tasks[index as usize % self.tasks.len()];
                 let split = &self.splits[round % self.splits.len()];
                 let partner = &self.partners[round / self.splits.len() % self.partners.len()];
-                let mut rng = RngStream::new(seed, "episodes", index);
-                let id = format!("{task}/{split}/{}", SeedRange::POLICY_TRAIN.draw(&mut rng));
+                let rng = RngStream::new(seed, "episodes", index);
+                let id = draw_episode(task, split, rng);
                 let partner = (partner != RULES).then(|| partner.clone());
                 RolloutEpisode { id, partner }
             })
             .collect()
     }
+}
+
+/// Number of seeds that are drawn until one has a valid episode. Of 8,000 tried, all had one
+/// (TESTING.md).
+const MAX_DRAWS: usize = 100;
+
+/// Returns the id of a training episode of this generator, with the first drawn seed that has a valid
+/// episode.
+pub(crate) fn draw_episode(task: TaskId, generator: &str, mut rng: RngStream) -> String {
+    let mut draw = || format!("{task}/{generator}/{}", SeedRange::POLICY_TRAIN.draw(&mut rng));
+    let mut id = draw();
+    for _ in 1..MAX_DRAWS {
+        if find_episode(&id).is_ok() {
+            break;
+        }
+        id = draw();
+    }
+    id
+}
+
+/// Returns the ids of the first `n` valid validation episodes of a task.
+pub(crate) fn validation_ids(task: TaskId, generator: &str, n: usize) -> Vec<String> {
+    let SeedRange { first, count, .. } = SeedRange::POLICY_VALIDATION;
+    let ids = (first..first + count).map(|seed| format!("{task}/{generator}/{seed}"));
+    ids.filter(|id| find_episode(id).is_ok()).take(n).collect()
 }
 
 /// Reads the weights of an opponent model.
@@ -206,14 +235,9 @@ pub(crate) fn validation_episodes(
     splits: &[String],
     n: usize,
 ) -> Vec<RolloutEpisode> {
-    let first = SeedRange::POLICY_VALIDATION.first;
     let split = splits.last().map_or(GENERATORS[0], String::as_str);
-    let of_task = |task: &TaskId| {
-        let task = *task;
-        let ids = (first..first + n as u64).map(move |seed| format!("{task}/{split}/{seed}"));
-        ids.map(RolloutEpisode::new)
-    };
-    tasks.iter().flat_map(of_task).collect()
+    let of_task = |task: &TaskId| validation_ids(*task, split, n);
+    tasks.iter().flat_map(of_task).map(RolloutEpisode::new).collect()
 }
 
 /// Validation metric by which weights are selected: the mean transport rate with the selection of

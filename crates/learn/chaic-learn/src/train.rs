@@ -23,6 +23,7 @@ use serde::{Deserialize, Serialize};
 use crate::actor_critic::Optimizer;
 use crate::candidate_scorer::{CandidateScorer, CandidateSet};
 use crate::cloning::{CloningMetrics, Demonstration, EXPERTS, ExpertInfo, FitConfig, fit};
+use crate::decision_memory::N_MEMORY_PLAN;
 use crate::demonstrations::Demonstrations;
 use crate::opponent::network::OpponentModel;
 use crate::policy_kind::{PolicyKind, PolicyWeights};
@@ -71,7 +72,9 @@ impl TrainState {
 
     /// Updates the statistics that normalize the network's inputs.
     fn update_normalizer<'a>(&mut self, decisions: impl Iterator<Item = &'a CandidateSet> + Clone) {
-        self.model.update_normalizer(&mut self.learner.parameters, decisions);
+        // Candidates have zeros in place of the features that earlier decisions add.
+        let n_raw = if self.kind.memory > 0 { N_MEMORY_PLAN } else { 0 };
+        self.model.update_normalizer(&mut self.learner.parameters, decisions, n_raw);
     }
 
     fn weights(&self) -> Result<Vec<u8>, WeightsError> {
@@ -200,9 +203,14 @@ impl<A: Algorithm> Trainer for PolicyTrainer<A> {
 
     fn read_weights(config: &A, weights: &[u8]) -> Result<Vec<f32>, WeightsError> {
         let rollout = config.spec().rollout;
-        let kind = rollout.policy_kind(rollout.read_opponent().ok().flatten().as_ref());
+        let opponent = rollout.read_opponent().ok().flatten();
+        let kind = rollout.policy_kind(opponent.as_ref());
         let model = kind.network();
-        let parameters = weights::from_bytes(&model.network, weights, &kind.name())?;
+        let mut parameters = weights::from_bytes(&model.network, weights, &kind.name())?;
+        // The model of the configuration replaces that of the weights.
+        if let (Some(range), Some(opponent)) = (PolicyKind::opponent_range(&model), &opponent) {
+            parameters[range].copy_from_slice(opponent.parameters());
+        }
         if rollout.normalize && !model.has_normalizer(&parameters) {
             // The first update of the statistics would change all inputs at once.
             let problem = "trained without `rollout.normalize`, so it cannot be enabled";
@@ -363,14 +371,14 @@ impl Algorithm for PpoTrainingConfig {
 /// Expert of `chaic train clone`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct TeacherConfig {
+pub struct ExpertConfig {
     /// Name of the helper that is imitated, see [`EXPERTS`].
     pub helper: String,
 }
 
-impl Default for TeacherConfig {
-    fn default() -> TeacherConfig {
-        TeacherConfig { helper: EXPERTS[0].name.to_owned() }
+impl Default for ExpertConfig {
+    fn default() -> ExpertConfig {
+        ExpertConfig { helper: EXPERTS[0].name.to_owned() }
     }
 }
 
@@ -383,7 +391,8 @@ pub struct CloningConfig {
     /// Total number of iterations.
     pub iterations: u64,
     /// Expert.
-    pub teacher: TeacherConfig,
+    #[serde(alias = "teacher")]
+    pub expert: ExpertConfig,
     /// Rollouts.
     #[serde(alias = "play")]
     pub rollout: RolloutConfig,
@@ -418,7 +427,7 @@ impl Default for CloningConfig {
         CloningConfig {
             seed: 1,
             iterations: 100,
-            teacher: TeacherConfig::default(),
+            expert: ExpertConfig::default(),
             rollout: RolloutConfig::default(),
             learner_fraction: 0.7,
             max_episodes: 8192,
@@ -463,10 +472,10 @@ impl Algorithm for CloningConfig {
     }
 
     fn check(&self) -> Result<(), String> {
-        let name = &self.teacher.helper;
+        let name = &self.expert.helper;
         if ExpertInfo::find_expert(name).is_none() {
             let names: Vec<&str> = EXPERTS.iter().map(|expert| expert.name).collect();
-            return Err(format!("`teacher.helper` is `{name}`, expected {}", names.join(", ")));
+            return Err(format!("`expert.helper` is `{name}`, expected {}", names.join(", ")));
         }
         Ok(())
     }
@@ -483,7 +492,7 @@ impl Algorithm for CloningConfig {
         context: &IterationContext<'_>,
     ) -> Result<Option<Metrics>, TrainingError> {
         let IterationContext { folder, perception, stop } = *context;
-        let expert = ExpertInfo::find_expert(&self.teacher.helper).expect("it was checked");
+        let expert = ExpertInfo::find_expert(&self.expert.helper).expect("it was checked");
         let played = self.rollout.sample_episodes(self.seed, state.iterations);
         let rollout = self.rollout.context(perception, self.gamma, stop);
         let weights = state.policy_weights();

@@ -15,12 +15,15 @@ use crate::trainer::Trainer;
 
 /// Maximum size of a checkpoint in which every bit is flipped, bits.
 const EVERY_BIT: usize = 20_000;
-/// Number of bits that are flipped in larger checkpoints, besides those of the first bytes.
-const SAMPLED_BITS: usize = 160;
+/// Number of bits that are flipped in larger checkpoints, besides those of the first bytes: as many as
+/// [`SAMPLED_BYTES`] allow.
+const SAMPLED_BITS: [usize; 2] = [24, 160];
+/// Bytes that all of these flips together should read.
+const SAMPLED_BYTES: usize = 1 << 30;
 /// Number of first bytes of larger checkpoints in which every [`HEAD_STRIDE`]-th bit is flipped:
 /// head, identity and first section.
 const HEAD_BYTES: usize = 160;
-/// An odd stride visits all bits of a byte.
+/// Stride in checkpoints with the maximum number of samples. An odd stride visits all bits of a byte.
 const HEAD_STRIDE: usize = 5;
 
 /// Asserts that a trainer refuses every damaged checkpoint, and every one with impossible values.
@@ -56,8 +59,11 @@ fn sampled_bits(n_bits: usize) -> Vec<usize> {
     if n_bits <= EVERY_BIT {
         return (0..n_bits).collect();
     }
-    let step = n_bits / SAMPLED_BITS;
-    let head = (0..8 * HEAD_BYTES).step_by(HEAD_STRIDE);
+    let [min, max] = SAMPLED_BITS;
+    let n = (8 * SAMPLED_BYTES / n_bits).clamp(min, max);
+    let step = n_bits / n;
+    let head_stride = HEAD_STRIDE * max / n;
+    let head = (0..8 * HEAD_BYTES).step_by(head_stride | 1);
     head.chain((0..n_bits).step_by(step | 1)).collect()
 }
 

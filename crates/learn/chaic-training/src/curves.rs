@@ -77,13 +77,14 @@ pub fn metrics<const N: usize>(named: [(&str, f64); N]) -> Metrics {
     named.into_iter().map(|(name, x)| (name.to_owned(), x)).collect()
 }
 
-/// Returns the mean of each metric.
+/// Returns the mean of each metric over the steps that have it.
 pub(crate) fn mean(steps: &[Metrics]) -> Metrics {
-    let mut sums = Metrics::new();
+    let n_steps = |name: &str| steps.iter().filter(|step| step.contains_key(name)).count();
+    let mut means = Metrics::new();
     for (name, x) in steps.iter().flatten() {
-        *sums.entry(name.clone()).or_default() += x / steps.len() as f64;
+        *means.entry(name.clone()).or_default() += x / n_steps(name) as f64;
     }
-    sums
+    means
 }
 
 /// Appends a line.

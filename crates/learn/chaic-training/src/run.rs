@@ -28,6 +28,7 @@ const MAX_BYTES: u64 = 1 << 30;
 
 /// Sections that every checkpoint has besides those of its trainer.
 const METRIC_NAMES: &str = "run.figure_names";
+const METRIC_COUNTS: &str = "run.figure_counts";
 const METRIC_VALUES: &str = "run.figures";
 const VALIDATION_IS_DUE: &str = "run.validation_is_due";
 const BEST_SCORE: &str = "run.best_score";
@@ -90,8 +91,11 @@ fn insert_progress(
     best_score: Option<f64>,
 ) {
     let names: Vec<&str> =
-        pending_metrics.iter().take(1).flat_map(|m| m.keys().map(|name| &**name)).collect();
+        pending_metrics.iter().flat_map(|m| m.keys().map(|name| &**name)).collect();
     checkpoint.insert_bytes(METRIC_NAMES, names.join("\n").into_bytes());
+    // Steps of different stages have different metrics.
+    let counts = pending_metrics.iter().map(|metrics| metrics.len() as u64);
+    checkpoint.insert_bytes(METRIC_COUNTS, counts.flat_map(u64::to_le_bytes).collect());
     let values = pending_metrics.iter().flat_map(|metrics| metrics.values().copied());
     checkpoint.insert_doubles(METRIC_VALUES, values.collect());
     checkpoint.insert_integers(VALIDATION_IS_DUE, vec![u64::from(validation_is_due)]);
@@ -106,17 +110,26 @@ fn read_progress(
         .map_err(|_| CheckpointError::section(METRIC_NAMES, "is not UTF-8 text"))?;
     let names: Vec<&str> = names.split('\n').collect();
     let values = checkpoint.doubles(METRIC_VALUES)?;
-    if !values.len().is_multiple_of(names.len()) {
+    let counts: Vec<usize> = match checkpoint.bytes(METRIC_COUNTS) {
+        Ok(bytes) => {
+            let counts = bytes.as_chunks::<8>().0.iter().map(|bytes| u64::from_le_bytes(*bytes));
+            counts.map(|count| count as usize).collect()
+        }
+        // A checkpoint of an earlier version has the same names for all steps.
+        Err(_) => vec![names.len(); values.len() / names.len()],
+    };
+    let n = counts.iter().fold(0, |sum: usize, count| sum.saturating_add(*count));
+    if n != values.len() {
         return Err(CheckpointError::section(METRIC_VALUES, "does not fit the names of metrics"));
     }
-    let step_metrics = |values: &[f64]| {
-        names
-            .iter()
-            .map(|name| curves::current_name(name).to_owned())
-            .zip(values.iter().copied())
-            .collect()
-    };
-    let pending_metrics = values.chunks_exact(names.len()).map(step_metrics).collect();
+    let mut named = names.iter().cycle().zip(values);
+    let pending_metrics = counts
+        .into_iter()
+        .map(|count| {
+            let of_step = named.by_ref().take(count);
+            of_step.map(|(name, x)| (curves::current_name(name).to_owned(), *x)).collect()
+        })
+        .collect();
     let validation_is_due = checkpoint.integer(VALIDATION_IS_DUE)?;
     let best_score = match checkpoint.doubles(BEST_SCORE)? {
         [] => None,

@@ -20,6 +20,8 @@ use serde::{Deserialize, Serialize};
 /// File in the folder that interrupts the next validation.
 const INTERRUPT: &str = "interrupt";
 const WEIGHTS_KIND: &str = "toy 1";
+/// First step with other metrics, in the middle of a record.
+const SECOND_STAGE: u64 = 14;
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -143,7 +145,11 @@ impl<const HAS_SCORE: bool> Trainer for Toy<HAS_SCORE> {
         if step == self.config.breaks_at {
             self.learner.parameters[1] = f32::NAN;
         }
-        Ok(Some(metrics([("loss", losses[0]), ("other", losses[1])])))
+        // As in a training of two stages, later steps have other metrics.
+        Ok(Some(match step < SECOND_STAGE {
+            true => metrics([("loss", losses[0]), ("other", losses[1])]),
+            false => metrics([("loss", losses[0]), ("stage", step as f64), ("third", losses[1])]),
+        }))
     }
 
     fn validate(&self, stop: &AtomicBool) -> Result<Option<(Metrics, Vec<u8>)>, WeightsError> {
@@ -296,6 +302,20 @@ fn a_training_that_is_stopped_anywhere_ends_with_the_same_files() {
     }
     assert!(run_to_end(&mut run, &mut |_, _| ()));
     assert!(final_files(&interrupted) == expected);
+}
+
+#[test]
+fn metrics_of_a_new_stage_are_averaged_over_its_steps() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut records = Vec::new();
+    let mut run = start(dir.path(), &ToyConfig::default());
+    run.run(&AtomicBool::new(false), &mut |record| records.push(record.clone())).unwrap();
+    // The record of step 15 covers steps 13 to 15.
+    let mixed = records.iter().find(|r| r.phase == Phase::Train && r.step == 15).unwrap();
+    assert_eq!(mixed.metrics["stage"], 14.5);
+    let next = records.iter().find(|r| r.phase == Phase::Train && r.step == 18).unwrap();
+    assert_eq!(next.metrics["stage"], 17.0);
+    assert!(mixed.metrics.contains_key("other") && !next.metrics.contains_key("other"));
 }
 
 #[test]

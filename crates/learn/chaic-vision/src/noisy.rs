@@ -101,6 +101,35 @@ impl DetectorNoiseModel {
         }
     }
 
+    /// Checks that rates and scores are fractions, areas ascend, and false positives are few.
+    ///
+    /// # Errors
+    /// One line that names the key.
+    pub fn check(&self) -> Result<(), String> {
+        /// Maximum mean number of false positives per image; more would cover it.
+        const MAX_FALSE_POSITIVES: f32 = 1000.0;
+        let is_fraction = |x: &f32| (0.0..=1.0).contains(x);
+        let rates = &self.miss_rate_by_area;
+        if !rates.iter().all(|(_, rate)| is_fraction(rate)) {
+            return Err("miss_rate_by_area has a rate outside 0 to 1".to_owned());
+        }
+        if !rates.is_sorted_by(|(a, _), (b, _)| a < b) {
+            return Err("miss_rate_by_area must have ascending areas".to_owned());
+        }
+        if !is_fraction(&self.misclassification_rate) {
+            return Err("misclassification_rate must be from 0 to 1".to_owned());
+        }
+        if !self.scores.iter().all(is_fraction) {
+            return Err("scores must be from 0 to 1".to_owned());
+        }
+        if !(0.0..=MAX_FALSE_POSITIVES).contains(&self.false_positives_per_image) {
+            return Err(format!(
+                "false_positives_per_image must be from 0 to {MAX_FALSE_POSITIVES}"
+            ));
+        }
+        Ok(())
+    }
+
     /// Returns the miss rate of an object with `n_pixels` visible pixels in an image of `image_px`
     /// pixels.
     fn miss_rate(&self, n_pixels: usize, image_px: usize) -> f32 {
@@ -241,5 +270,40 @@ impl Perception for NoisyPerception {
 
     fn fork(&self) -> Box<dyn Perception> {
         Box::new(self.clone())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn impossible_rates_are_refused_by_key() {
+        DetectorNoiseModel::built_in().check().unwrap();
+        let none = DetectorNoiseModel::none;
+        let wrong = [
+            (
+                "miss_rate_by_area",
+                DetectorNoiseModel { miss_rate_by_area: vec![(24, 61.0)], ..none() },
+            ),
+            (
+                "miss_rate_by_area",
+                DetectorNoiseModel { miss_rate_by_area: vec![(64, 0.1), (24, 0.5)], ..none() },
+            ),
+            (
+                "misclassification_rate",
+                DetectorNoiseModel { misclassification_rate: f32::NAN, ..none() },
+            ),
+            // With so many, an image would never be complete.
+            (
+                "false_positives_per_image",
+                DetectorNoiseModel { false_positives_per_image: 1e9, ..none() },
+            ),
+            ("scores", DetectorNoiseModel { scores: [0.9, -0.1], ..none() }),
+        ];
+        for (key, noise) in wrong {
+            let problem = noise.check().unwrap_err();
+            assert!(problem.starts_with(key), "{problem}");
+        }
     }
 }

@@ -138,12 +138,11 @@ fn factory_from_name(name: &str) -> Result<Arc<dyn PerceptionFactory>, Perceptio
         )));
     }
     if let Some(path) = file_of(name, NOISY) {
-        let rates_error = |e: serde_json::Error| PerceptionError::Rates {
-            path: path.to_owned(),
-            problem: e.to_string(),
-        };
-        let rates: DetectorNoiseModel =
-            serde_json::from_slice(&read_user_file(path, MAX_BYTES)?).map_err(rates_error)?;
+        let rates_error =
+            |problem: String| PerceptionError::Rates { path: path.to_owned(), problem };
+        let rates: DetectorNoiseModel = serde_json::from_slice(&read_user_file(path, MAX_BYTES)?)
+            .map_err(|e| rates_error(e.to_string()))?;
+        rates.check().map_err(rates_error)?;
         return Ok(Arc::new(NoisyPerceptionFactory::new(
             rates,
             format!("{NOISY} {}", path.display()),

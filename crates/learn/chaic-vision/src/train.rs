@@ -173,12 +173,17 @@ fn draw_batch(
                 rng.choose(&pixels).copied()
             });
             let mut crop_start = |center: Option<usize>| {
+                /// Crops are aligned to the network's strides, as whole images are.
+                const STRIDE: usize = 32;
                 let first = match center {
                     Some(at) => (at + rng.below(side / 2)).saturating_sub(side * 3 / 4),
                     None => rng.below(size - side + 1),
                 };
-                // Crops are aligned to the network's strides, as whole images are.
-                first.min(size - side) / 32 * 32
+                let aligned = first.min(size - side) / STRIDE * STRIDE;
+                // A small crop could end before the pixel.
+                center.map_or(aligned, |at| {
+                    aligned.max((at + 1).saturating_sub(side).next_multiple_of(STRIDE))
+                })
             };
             let origin =
                 [crop_start(center.map(|k| k % size)), crop_start(center.map(|k| k / size))];
@@ -315,7 +320,11 @@ impl DetectorLearner {
     pub(crate) fn trained(&self) -> TrainedDetector {
         let first_stage =
             TrainedDetector::uncalibrated(&self.detector, &self.learner.ema_parameters);
-        let second_stage = (self.roi_learner.adam.steps > 0).then(|| SecondStage {
+        // `--weights` can hold a trained second stage.
+        let initial = || self.roi_network.network.init_parameters(self.config.seed);
+        let is_trained =
+            self.roi_learner.adam.steps > 0 || self.roi_learner.parameters != initial();
+        let second_stage = is_trained.then(|| SecondStage {
             network: self.roi_network.clone(),
             parameters: self.roi_learner.ema_parameters.clone(),
         });
@@ -418,6 +427,11 @@ impl Trainer for DetectorLearner {
         if far_m < 1.5 * near_m {
             return Err("views.distance_m must be from near to far, the second at least 1.5 times the first"
                 .to_owned());
+        }
+        if config.steps == 0 && config.second_stage.steps == 0 {
+            return Err(
+                "steps and second_stage.steps are both 0; nothing would be trained".to_owned()
+            );
         }
         if loss.weight_range[0] > loss.weight_range[1] {
             return Err("loss.weight_range must be minimum and maximum".to_owned());

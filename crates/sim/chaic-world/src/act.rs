@@ -33,7 +33,7 @@ impl World {
             Err(reason) => {
                 let is_taking =
                     matches!(action, Action::PickUp { .. } | Action::RemoveObstacle { .. });
-                let frames = if is_taking { self.rules.durations.refused_pick } else { 1 };
+                let frames = if is_taking { self.rules.durations.refused_pick_up } else { 1 };
                 (vec![ActionStep::new(Phase::Stand, frames)], Some(reason))
             }
         };
@@ -149,8 +149,8 @@ impl World {
         ActionStep::new(arms, self.rules.durations.raise_furniture)
     }
 
-    fn gap(&self) -> ActionStep {
-        ActionStep::new(Phase::Stand, self.rules.durations.gap)
+    fn pause(&self) -> ActionStep {
+        ActionStep::new(Phase::Stand, self.rules.durations.pause)
     }
 
     /// Returns whether an object exists, is close enough for an approach (facts S3.4), and is not

@@ -47,7 +47,7 @@ impl World {
             let (spec, state) = self.object(*e);
             spec.class.info().role == Role::Obstacle && state.last_holder.is_some()
         };
-        let announced = self.setup.entities().filter(|_| self.rules.tells_removed);
+        let announced = self.setup.entities().filter(|_| self.rules.announces_removed_obstacles);
         announced.filter(is_removed).collect()
     }
 
@@ -90,7 +90,7 @@ impl World {
         let radius = self.delivery_radius_m();
         let near =
             |g: &EntityId| horizontal_distance(self.object(*g).1.position, position) <= radius;
-        let is_at_goal = if self.rules.dropped_counts {
+        let is_at_goal = if self.rules.failed_put_on_can_deliver {
             state.last_holder.is_some() && self.setup.goal_places.iter().any(near)
         } else {
             released_at.is_some_and(|g| near(&g))

@@ -52,7 +52,7 @@ impl World {
                 ObjectLocation::Inside { container, .. } => Some(container),
                 _ => None,
             },
-            is_out_of_play: state.delivered.is_some() || state.location == ObjectLocation::Broken,
+            is_gone: state.delivered.is_some() || state.location == ObjectLocation::Broken,
         }
     }
 

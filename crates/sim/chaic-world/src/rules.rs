@@ -23,27 +23,33 @@ pub struct Durations {
     /// Closing a hand on nothing because a limit is exceeded. Our choice: as long as a successful
     /// grasp, so that both attempts take the same time. The original omits it: 55 frames instead of
     /// 57 (facts S1.4 and S2.2).
-    pub vain_grasp: u32,
+    #[serde(alias = "vain_grasp")]
+    pub failed_grasp: u32,
     /// Return of both arms to rest.
     pub reset_arms: u32,
     /// Pause between two phases of a composite action.
-    pub gap: u32,
+    #[serde(alias = "gap")]
+    pub pause: u32,
     /// A short motion that moves the arm away.
-    pub move_away: u32,
+    #[serde(alias = "move_away")]
+    pub retract_arm: u32,
     /// Opening a hand.
     pub open_hand: u32,
     /// Maximum number of extra frames for watching a released object fall.
-    pub watch_fall: u32,
+    #[serde(alias = "watch_fall")]
+    pub max_fall_wait: u32,
     /// Maximum number of extra frames for watching an object that was put into a container. The
     /// number is drawn uniformly: a put-in takes 80 to 104 frames (facts S2.2), and the
     /// distribution is unknown.
-    pub watch_put_in: u32,
+    #[serde(alias = "watch_put_in")]
+    pub max_put_in_wait: u32,
     /// Maximum number of frames that an agent at furniture waits for the other to arrive.
     pub await_partner: u32,
     /// Raising furniture after the grasp.
     pub raise_furniture: u32,
     /// A pick-up that is refused immediately: the object is out of reach, held or out of play.
-    pub refused_pick: u32,
+    #[serde(alias = "refused_pick")]
+    pub refused_pick_up: u32,
 }
 
 /// Behavior of an agent that walks into something.
@@ -111,7 +117,8 @@ pub struct Rules {
     /// Condition for a joint lift of furniture.
     pub joint_lift: JointLift,
     /// True if all agents are informed at once about removed obstacles (facts S5.5).
-    pub tells_removed: bool,
+    #[serde(alias = "tells_removed")]
+    pub announces_removed_obstacles: bool,
     /// Chance of a pick-up beyond the height range of the agent (facts S1.3).
     pub pick_penalty: LimitPenalty,
     /// Chance of a put-on beyond the height range of the agent (facts S1.3).
@@ -125,12 +132,14 @@ pub struct Rules {
     pub delivery_margin_m: f32,
     /// True if an object that a failed put-on dropped counts if it lands close enough. The radius
     /// rule of the original allows it.
-    pub dropped_counts: bool,
+    #[serde(alias = "dropped_counts")]
+    pub failed_put_on_can_deliver: bool,
     /// True if a successful put-on anywhere delivers all objects that its agent has released so
     /// far, and the object that the agent drops in the next put-on. It is the second rule of the
     /// original, made for high goal places (facts S5.3): there a failed put-on delivers nothing by
     /// itself.
-    pub delivered_anywhere: bool,
+    #[serde(alias = "delivered_anywhere")]
+    pub put_on_delivers_all_released: bool,
     /// True if briefings list containers when a wheelchair user takes part. The agents of the
     /// original ignore containers there (facts S13, number 12).
     pub containers_with_wheelchair: bool,
@@ -175,16 +184,16 @@ impl Rules {
                 keep_walking: 1,
                 reach: 16,
                 grasp: 2,
-                vain_grasp: 2,
+                failed_grasp: 2,
                 reset_arms: 35,
-                gap: 1,
-                move_away: 4,
+                pause: 1,
+                retract_arm: 4,
                 open_hand: 2,
-                watch_fall: 25,
-                watch_put_in: 24,
+                max_fall_wait: 25,
+                max_put_in_wait: 24,
                 await_partner: 150,
                 raise_furniture: 35,
-                refused_pick: 1,
+                refused_pick_up: 1,
             },
             stride_m: 0.4,
             turn_rad: std::f32::consts::PI / 12.0,
@@ -197,14 +206,14 @@ impl Rules {
             furniture_reach_limit_m: 2.0,
             reach_to: ReachTo::NearestPoint,
             joint_lift: JointLift::BothAtIt,
-            tells_removed: false,
+            announces_removed_obstacles: false,
             pick_penalty: LimitPenalty::PICK,
             put_penalty: LimitPenalty::PUT,
             lift_penalty: LimitPenalty::LIFT,
             container_capacity: 3,
             delivery_margin_m: 2.0,
-            dropped_counts: false,
-            delivered_anywhere: false,
+            failed_put_on_can_deliver: false,
+            put_on_delivers_all_released: false,
             containers_with_wheelchair: true,
             fragile_targets: true,
             break_chance_low: 0.25,
@@ -226,18 +235,18 @@ impl Rules {
                 // Facts S9.3: raised by one reach, without returning the arms.
                 raise_furniture: 17,
                 // Facts S2.2: one frame, then both arms return.
-                refused_pick: 37,
+                refused_pick_up: 37,
                 // Facts S1.4 and S2.2: after a failed reach the arms return at once.
-                vain_grasp: 0,
+                failed_grasp: 0,
                 ..paper.durations
             },
             blocking: Blocking::Creeps,
             furniture_reach_limit_m: 3.0,
             reach_to: ReachTo::Middle,
             joint_lift: JointLift::LastChoice,
-            tells_removed: true,
-            dropped_counts: true,
-            delivered_anywhere: true,
+            announces_removed_obstacles: true,
+            failed_put_on_can_deliver: true,
+            put_on_delivers_all_released: true,
             containers_with_wheelchair: false,
             fragile_targets: false,
             break_chance_low: 0.0,

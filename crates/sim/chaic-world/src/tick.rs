@@ -103,7 +103,7 @@ impl World {
         self.record_event(EventKind::Ended { agent, action, outcome });
         // The original reads its record of actions anew at every check, so a successful put-on also
         // covers what the agent held then and drops next (facts S5.3).
-        if self.rules.delivered_anywhere
+        if self.rules.put_on_delivers_all_released
             && is_put_on(action)
             && (outcome.is_success() || has_put_on)
         {

@@ -123,7 +123,7 @@ pub fn class_bit(briefing: &Briefing, class: ClassId) -> ClassBits {
 /// Returns whether the partner has a free hand and time to fetch something, as far as known.
 fn may_fetch(briefing: &Briefing, memory: &Memory, behavior: &BehaviorLog) -> bool {
     let is_late = memory.frame as f32 > LAST_FRACTION * briefing.horizon as f32;
-    let max_age = memory.rules.time.partner_holds_frames;
+    let max_age = memory.rules.time.partner_load_valid_frames;
     let holds = behavior.partner_load(memory.frame, max_age);
     let n_targets = holds.iter().filter(|(_, c)| briefing.possible_targets.contains(c)).count();
     !is_late && n_targets < 2
@@ -137,7 +137,7 @@ fn may_fetch_container(
     approaches: impl Fn(Vec2) -> bool,
     at: Vec2,
 ) -> bool {
-    let max_age = memory.rules.time.partner_holds_frames;
+    let max_age = memory.rules.time.partner_load_valid_frames;
     let holds = behavior.partner_load(memory.frame, max_age);
     if holds.iter().any(|(_, class)| class.info().role == Role::Container) {
         return false;

@@ -78,7 +78,7 @@ impl FrontierExplorer {
     pub fn step(&mut self, memory: &mut Memory, navigator: &mut dyn Navigator) -> ExplorationStep {
         let now = memory.frame;
         self.blacklist.retain(|(_, until)| *until > now);
-        if self.target.is_some_and(|t| now > t.since + memory.rules.limits.explore_frames) {
+        if self.target.is_some_and(|t| now > t.since + memory.rules.plan_timeouts.explore_frames) {
             self.give_up(now);
         }
         if let Some(target) = self.target

@@ -50,7 +50,7 @@ impl Interaction {
         if memory.objects.get(track).is_none() {
             return ApproachStep::GiveUp;
         }
-        if self.n_failed >= memory.rules.failures.places_tried {
+        if self.n_failed >= memory.rules.failures.max_positions_tried {
             return self.give_up(memory, track);
         }
         match self.approach.step(memory, navigator, track, within_m, &self.failed_positions) {
@@ -107,7 +107,7 @@ pub fn apply_outcome(
         (Action::PutOn { place, .. }, Outcome::Failure(FailureReason::BeyondLimits)) => {
             // It fell: an object that was not managed once is ignored for a while. With the paper's
             // rules, the place is not.
-            memory.objects.ignore(place, now + memory.rules.goal_blackout_frames);
+            memory.objects.ignore(place, now + memory.rules.failed_goal_place_frames);
             for track in released {
                 memory.objects.ignore(track, now + memory.rules.failures.ignore_frames);
             }
@@ -131,15 +131,15 @@ fn apply_failure(memory: &mut Memory, object: TrackId, reason: FailureReason) {
                 .get(object)
                 .is_some_and(|t| t.class.info().role == Role::HeavyTarget);
             // Furniture is tried again at once, up to a limit (facts A2.5).
-            if !is_heavy || memory.objects.count_failure(object) >= rules.lift_tries {
+            if !is_heavy || memory.objects.count_failure(object) >= rules.max_failed_lifts {
                 memory.objects.ignore(object, now + rules.ignore_frames);
             }
         }
         FailureReason::Broke | FailureReason::OutOfPlay => memory.objects.mark_out_of_play(object),
         FailureReason::HeldByOther => {
-            memory.objects.mark_held(object, now + memory.rules.held_frames);
+            memory.objects.mark_held(object, now + memory.rules.seen_held_ignore_frames);
             // Regardless of its appearance: the failed attempt is certain evidence.
-            memory.objects.ignore(object, now + rules.held_for_sure_frames);
+            memory.objects.ignore(object, now + rules.held_refusal_ignore_frames);
         }
         FailureReason::Impossible => memory.objects.ignore(object, now + rules.impossible_frames),
         FailureReason::OutOfReach => {

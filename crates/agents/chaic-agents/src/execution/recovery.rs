@@ -100,8 +100,9 @@ impl Recovery {
         let reach_m = memory.costs().radius_m() + BUMP_AHEAD_M;
         let at = memory.position() + reach_m * ahead;
         // People move away.
-        let barred_frames = if is_person { 0 } else { memory.rules.failures.barred_frames };
-        memory.map.record_bump(at, memory.frame, barred_frames);
+        let repeated_collision_frames =
+            if is_person { 0 } else { memory.rules.failures.repeated_collision_frames };
+        memory.map.record_bump(at, memory.frame, repeated_collision_frames);
         // A small turn first, then larger ones.
         let n_turns = [2, 3, 5, 8].get(self.n_bumps as usize - 1).copied();
         self.back_off(memory, n_turns.unwrap_or(4 + rng.below(8)), rng);

@@ -28,13 +28,14 @@ pub struct CollisionMemory {
 
 impl CollisionMemory {
     /// Records a bump at `at` (x, z). Repeated bumps at one position form a barrier for
-    /// `barred_frames`.
-    pub fn record(&mut self, at: Vec2, now: Frame, barred_frames: Frame) {
+    /// `repeated_collision_frames`.
+    pub fn record(&mut self, at: Vec2, now: Frame, repeated_collision_frames: Frame) {
         self.recent.push(Bump { at, until: now + BUMP_FRAMES });
         let is_here = |bump: &Bump| bump.at.distance(at) < BARRIER_M;
         if self.recent.iter().filter(|b| is_here(b)).count() >= BARRIER_BUMPS {
             let here = self.recent.extract_if(.., |b| is_here(b));
-            self.barriers.extend(here.map(|b| Bump { until: now + barred_frames, ..b }));
+            self.barriers
+                .extend(here.map(|b| Bump { until: now + repeated_collision_frames, ..b }));
         }
     }
 

@@ -207,8 +207,8 @@ impl OccupancyMap {
     }
 
     /// Records a collision at `at` (x, z), see [`CollisionMemory::record`].
-    pub fn record_bump(&mut self, at: Vec2, now: Frame, barred_frames: Frame) {
-        self.bumps.record(at, now, barred_frames);
+    pub fn record_bump(&mut self, at: Vec2, now: Frame, repeated_collision_frames: Frame) {
+        self.bumps.record(at, now, repeated_collision_frames);
         self.version += 1;
     }
 

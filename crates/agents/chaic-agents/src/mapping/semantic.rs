@@ -90,7 +90,7 @@ impl Placement {
             bottom_m: object.bottom_m,
             top_m: object.top_m,
             is_lying,
-            is_available: is_lying && !object.is_out_of_play,
+            is_available: is_lying && !object.is_gone,
         }
     }
 
@@ -165,10 +165,7 @@ impl MappedObject {
 
     /// Returns whether it may be approached now: present, in play, not held, and not ignored.
     pub fn is_available(&self, now: Frame) -> bool {
-        self.is_present
-            && !self.is_out_of_play
-            && now >= self.ignore_until
-            && now >= self.held_until
+        self.is_present && !self.is_out_of_play && now >= self.ignore_until.max(self.held_until)
     }
 
     fn is_fixed(&self) -> bool {
@@ -261,12 +258,12 @@ impl SemanticMap {
     }
 
     /// Updates the map with the current detections. `people` are the positions of people in the
-    /// image: objects near their hands count as held for `held_frames`.
+    /// image: objects near their hands count as held for `seen_held_ignore_frames`.
     pub fn update(
         &mut self,
         detections: &[Detection],
         people: &[Vec3],
-        held_frames: Frame,
+        seen_held_ignore_frames: Frame,
         now: Frame,
     ) {
         for detection in detections.iter().filter(|d| d.person.is_none()) {
@@ -289,7 +286,7 @@ impl SemanticMap {
             }
             if let Some(object) = self.objects.get_mut(&detection.track) {
                 if is_held {
-                    object.held_until = now + held_frames;
+                    object.held_until = now + seen_held_ignore_frames;
                 } else if object.held_until > now {
                     object.held_until = 0;
                     self.n_changes += 1;
@@ -318,7 +315,7 @@ impl SemanticMap {
         }
         object.is_present = state.holder.is_some() || state.container.is_none();
         object.held_until = if state.holder.is_some() { now + PLACED_HELD_FRAMES } else { 0 };
-        object.is_out_of_play |= state.is_out_of_play;
+        object.is_out_of_play |= state.is_gone;
         object.misses = 0;
         let was_lying = from.is_some_and(|from| from.is_lying) && was_present;
         let was_available = from.is_some_and(|from| from.is_available) && was_present;
@@ -331,8 +328,7 @@ impl SemanticMap {
         }
     }
 
-    /// Increases the change count for each object whose `ignore_until` or `held_until` has passed since `before`,
-    /// and resets its failures.
+    /// Counts a change for each object that has become available since `before`, and resets its failures.
     pub fn count_newly_available(&mut self, before: Frame, now: Frame) {
         let passed = |until: Frame| before < until && until <= now;
         for object in self.objects.values_mut() {

@@ -137,7 +137,7 @@ fn moves_holders_containers_and_deliveries_are_followed() {
     world.update();
     assert!(world.can_take(apple));
 
-    world.object(apple).is_out_of_play = true;
+    world.object(apple).is_gone = true;
     world.update();
     assert!(
         !world.can_take(apple) && world.memory.objects.get(apple).expect("known").is_out_of_play

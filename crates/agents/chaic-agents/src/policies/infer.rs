@@ -177,7 +177,7 @@ impl InferPolicy {
             .memory
             .companion(context.briefing, CompanionRole::Partner)
             .map(|person| to_xz(person.position_in_world));
-        let max_age = context.memory.rules.time.partner_holds_frames;
+        let max_age = context.memory.rules.time.partner_load_valid_frames;
         let holds = context.behavior.partner_load(context.memory.frame, max_age).to_vec();
         let goals = self.goals(context.briefing);
         PartnerModel { capability: self.partner_capability(), position, holds, goals }

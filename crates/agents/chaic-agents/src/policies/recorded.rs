@@ -330,7 +330,7 @@ impl Policy for RecordedPolicy {
         self.ends_current = false;
         if !std::mem::replace(&mut self.has_looked_around, true) {
             self.rules.skip_look_around();
-            if context.memory.rules.looks_around_first {
+            if context.memory.rules.initial_look_around {
                 return Ok(Plan::TurnAround);
             }
         }
@@ -348,7 +348,7 @@ impl Policy for RecordedPolicy {
             Plan::TurnAround | Plan::PutIn => false,
             _ if pending.is_over(context) => true,
             Plan::Explore => {
-                let interval = context.memory.rules.time.reconsider_frames;
+                let interval = context.memory.rules.time.replan_interval_frames;
                 has_changed || now >= self.last_choice + interval
             }
             _ => false,

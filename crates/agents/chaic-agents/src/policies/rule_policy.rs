@@ -26,7 +26,7 @@ impl RulePolicy {
     pub fn decide(&mut self, context: &Context<'_>, valid: &[Plan]) -> Plan {
         self.last_choice = context.memory.frame;
         let rules = context.memory.rules;
-        if !std::mem::replace(&mut self.has_looked_around, true) && rules.looks_around_first {
+        if !std::mem::replace(&mut self.has_looked_around, true) && rules.initial_look_around {
             return Plan::TurnAround;
         }
         let hands = HandState::new(&context.memory.hands, context.briefing);
@@ -94,7 +94,7 @@ impl RulePolicy {
     pub(super) fn child_plan(&mut self, context: &Context<'_>) -> Option<Plan> {
         let (memory, now) = (context.memory, context.memory.frame);
         let child = context.briefing.companion(CompanionRole::Child)?;
-        if !(self.profile.minds_child && memory.rules.minds_child) {
+        if !(self.profile.supervises_child && memory.rules.supervises_child) {
             return None;
         }
         let guardian = memory.companion(context.briefing, CompanionRole::Partner);
@@ -106,8 +106,8 @@ impl RulePolicy {
         };
         // The child turns back at its next decision; from then on it needs no company.
         let has_stood = |since: Frame| now > since + people.child_stand_frames;
-        let is_overdue = |since: Frame| now >= since + people.child_trust_frames;
-        let is_trusted = memory.rules.trusts_child
+        let is_overdue = |since: Frame| now >= since + people.child_return_frames;
+        let is_trusted = memory.rules.leaves_returning_child
             && self.beside_child.is_some_and(|since| has_stood(since) && !is_overdue(since));
         if self.beside_child.is_some_and(is_overdue) {
             self.beside_child = None;
@@ -166,12 +166,14 @@ impl RulePolicy {
             return None;
         }
         let now = context.memory.frame;
-        let call_frames = context.memory.rules.lifting.call_frames;
+        let help_request_frames = context.memory.rules.lifting.help_request_frames;
         let failed = Outcome::Failure(FailureReason::BeyondLimits);
         let partner = context.briefing.companion(CompanionRole::Partner);
         let failed_on = partner
             .and_then(|p| context.behavior.last_pick_of(p))
-            .filter(|(pick, _)| pick.frame + call_frames > now && pick.outcome == Some(failed))
+            .filter(|(pick, _)| {
+                pick.frame + help_request_frames > now && pick.outcome == Some(failed)
+            })
             .map(|(_, object)| object);
         let strength_kg = context.briefing.capability.strength_kg;
         valid.iter().copied().find(|plan| match plan {
@@ -194,7 +196,7 @@ impl Policy for RulePolicy {
 
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, has_changed: bool) -> bool {
         let rules = context.memory.rules;
-        if !rules.reconsiders {
+        if !rules.replans {
             return self.check_interruption(context, current);
         }
         if matches!(current, Plan::Deliver | Plan::PutIn | Plan::LiftWith(_) | Plan::TurnAround) {
@@ -206,7 +208,7 @@ impl Policy for RulePolicy {
         }
         has_changed
             || self.needs_child_care(context)
-            || context.memory.frame >= self.last_choice + rules.time.reconsider_frames
+            || context.memory.frame >= self.last_choice + rules.time.replan_interval_frames
     }
 
     fn fork(&self) -> Option<RulePolicy> {
@@ -215,8 +217,8 @@ impl Policy for RulePolicy {
 }
 
 impl RulePolicy {
-    /// Returns whether the rules for the child interrupt the plan, and notes a finished look around. In the original, nothing else
-    /// does (facts A2.4).
+    /// Returns whether the rules for the child interrupt the plan, and notes a finished look around. In
+    /// the original, nothing else interrupts it (facts A2.4).
     fn check_interruption(&mut self, context: &Context<'_>, current: &Plan) -> bool {
         match current {
             // The time since looking around starts at its end.
@@ -256,7 +258,7 @@ impl<'a> RemainingNeeds<'a> {
         let mut done: Vec<ClassId> =
             memory.delivered.iter().filter_map(|e| memory.class_of(*e)).collect();
         done.extend(hands.targets.iter().map(|(_, class)| *class));
-        let max_age = memory.rules.time.partner_holds_frames;
+        let max_age = memory.rules.time.partner_load_valid_frames;
         let held = context.behavior.partner_load(memory.frame, max_age).iter();
         done.extend(held.filter(|(e, _)| !memory.delivered.contains(e)).map(|(_, class)| *class));
         RemainingNeeds { goal, done }
@@ -317,7 +319,7 @@ fn frames_left(context: &Context<'_>) -> f32 {
 
 /// Estimated walking time for this path length, frames.
 fn walking_frames(context: &Context<'_>, path_m: f32) -> f32 {
-    context.memory.rules.time.walk_factor * path_m
+    context.memory.rules.time.path_time_factor * path_m
         / context.briefing.capability.speed_m_per_frame.max(1e-3)
 }
 
@@ -330,9 +332,11 @@ fn must_deliver(context: &Context<'_>, profile: &RuleProfile) -> bool {
         None => profile.deliver_below_unknown,
     };
     let rules = context.memory.rules;
-    let spare_frames = rules.time.spare_frames as f32;
-    let is_far = rules.weighs_time
-        && place.is_some_and(|m| frames_left(context) < walking_frames(context, m) + spare_frames);
+    let delivery_reserve_frames = rules.time.delivery_reserve_frames as f32;
+    let is_far = rules.checks_time_to_deliver
+        && place.is_some_and(|m| {
+            frames_left(context) < walking_frames(context, m) + delivery_reserve_frames
+        });
     fraction_left(context) < threshold || is_far
 }
 
@@ -340,7 +344,8 @@ fn must_deliver(context: &Context<'_>, profile: &RuleProfile) -> bool {
 /// straight line at full speed.
 fn has_time_for(context: &Context<'_>, track: TrackId) -> bool {
     let memory = context.memory;
-    let Some(object) = memory.objects.get(track).filter(|_| memory.rules.weighs_time) else {
+    let Some(object) = memory.objects.get(track).filter(|_| memory.rules.checks_time_to_deliver)
+    else {
         return true;
     };
     let at = to_xz(object.position_in_world);

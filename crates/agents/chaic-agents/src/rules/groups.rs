@@ -9,15 +9,19 @@ use serde::{Deserialize, Serialize};
 pub struct TimeRules {
     /// Time after which a plan is reconsidered, frames. Ours: a walk of four steps; relevant map
     /// changes trigger it at once.
-    pub reconsider_frames: Frame,
+    #[serde(alias = "reconsider_frames")]
+    pub replan_interval_frames: Frame,
     /// Time for which the partner's last known held objects count as done, frames. Ours: as long as
-    /// objects held by others are avoided (`held_frames` of the paper's rules).
-    pub partner_holds_frames: Frame,
+    /// objects held by others are avoided (`seen_held_ignore_frames` of the paper's rules).
+    #[serde(alias = "partner_holds_frames")]
+    pub partner_load_valid_frames: Frame,
     /// Time reserve for the walk to the goal place, frames. Ours: a put-on takes up to 100, and a
     /// bump or a blocked path costs more.
-    pub spare_frames: Frame,
+    #[serde(alias = "spare_frames")]
+    pub delivery_reserve_frames: Frame,
     /// Ratio of walking time to path length at full speed. Ours: it covers turns, starts and stops.
-    pub walk_factor: f32,
+    #[serde(alias = "walk_factor")]
+    pub path_time_factor: f32,
     /// Minimum time of a pick-up and a put-on together, frames. Ours: slightly less than the
     /// world's minimum of 58 + 75, so that no feasible delivery is ruled out.
     pub pick_and_put_frames: Frame,
@@ -25,7 +29,7 @@ pub struct TimeRules {
 
 /// Time limits of plans. All are the original's (facts A2.1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct PlanLimits {
+pub struct PlanTimeouts {
     /// Exploration of one target, frames.
     pub explore_frames: Frame,
     /// Picking up, putting, removing and all plans not listed here, frames.
@@ -44,25 +48,30 @@ pub struct FailureRules {
     /// Time for which an object is ignored after a failed attempt, frames (facts A1.1, A2.1).
     pub ignore_frames: Frame,
     /// Failed lifts of one piece of furniture before it is ignored (facts A2.5).
-    pub lift_tries: u32,
+    #[serde(alias = "lift_tries")]
+    pub max_failed_lifts: u32,
     /// Number of positions from which an object is tried in one plan. Ours: one for each of its
     /// sides.
-    pub places_tried: u32,
+    #[serde(alias = "places_tried")]
+    pub max_positions_tried: u32,
     /// Time for which a position with a failed interaction is remembered, frames. Ours: longer than
     /// an object is ignored, so that the next attempt starts elsewhere.
-    pub bad_place_frames: Frame,
+    #[serde(alias = "bad_place_frames")]
+    pub failed_position_frames: Frame,
     /// Time for which an unreachable object is ignored, frames. Ours: as long as one exploration
     /// plan may take, which may reveal a path.
     pub unreachable_frames: Frame,
     /// Time for which an object is ignored after a pick-up failed because another agent holds it,
     /// frames. Ours: about as long as a pick-up takes.
-    pub held_for_sure_frames: Frame,
+    #[serde(alias = "held_for_sure_frames")]
+    pub held_refusal_ignore_frames: Frame,
     /// Time for which an object is ignored after an impossible interaction, frames. Ours: two
     /// thirds of an episode, because what is impossible stays so.
     pub impossible_frames: Frame,
     /// Time for which the position of repeated bumps counts as occupied, frames. Ours: a third of
     /// an episode, because obstacles stay unless an agent removes them.
-    pub barred_frames: Frame,
+    #[serde(alias = "barred_frames")]
+    pub repeated_collision_frames: Frame,
 }
 
 /// Lifting furniture together with the partner. The original's planners never plan to do so (facts
@@ -71,19 +80,24 @@ pub struct FailureRules {
 pub struct LiftingRules {
     /// Maximum distance of a partner at a piece from its nearest known point, meters. It is twice
     /// the arm's length of 0.7 m, because parts of a piece may be unseen.
-    pub at_piece_m: f32,
+    #[serde(alias = "at_piece_m")]
+    pub partner_at_furniture_m: f32,
     /// Maximum age of that sighting, frames. It equals the time for which an agent waits at
     /// furniture for the other (`world.durations.await_partner`).
-    pub at_piece_frames: Frame,
+    #[serde(alias = "at_piece_frames")]
+    pub partner_sighting_max_age_frames: Frame,
     /// Time for which a failed lift of the partner counts as a call for help, frames: enough to
     /// walk 14 m.
-    pub call_frames: Frame,
+    #[serde(alias = "call_frames")]
+    pub help_request_frames: Frame,
     /// Distance from which a partner has left the piece, meters: the world lets agents step up from
     /// at most 3 m.
-    pub left_piece_m: f32,
+    #[serde(alias = "left_piece_m")]
+    pub partner_left_furniture_m: f32,
     /// Maximum number of failed lifts per plan. Eight lifts that wait for the partner until the
     /// timeout exceed the plan's time limit; the bound is for those that fail early.
-    pub tries_together: u32,
+    #[serde(alias = "tries_together")]
+    pub max_failed_joint_lifts: u32,
 }
 
 /// Distances to people, and tracking of the child.
@@ -103,7 +117,8 @@ pub struct PeopleRules {
     pub child_stand_frames: Frame,
     /// Time for which the child is trusted to come back after the helper first stood beside it,
     /// frames. Ours: it walks 5.9 m in that time, and escapes to more than 5 m (facts A2.4).
-    pub child_trust_frames: Frame,
+    #[serde(alias = "child_trust_frames")]
+    pub child_return_frames: Frame,
     /// Time for which a person counts as recently seen, frames (facts A2.1).
     pub fresh_frames: Frame,
     /// Distance between child and partner, both in view, from which the child is away, meters
@@ -117,45 +132,57 @@ pub struct PeopleRules {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChildRules {
     /// Minimum time between two draws whether it runs away, frames.
-    pub plan_frames: Frame,
+    #[serde(alias = "plan_frames")]
+    pub decision_interval_frames: Frame,
     /// Probability to run away per draw, with draws from the episode's random stream.
-    pub run_chance: f32,
+    #[serde(alias = "run_chance")]
+    pub escape_probability: f32,
     /// Distance of the helper at which it turns back, meters.
-    pub caught_m: f32,
+    #[serde(alias = "caught_m")]
+    pub turn_back_distance_m: f32,
     /// Distance from its guardian at which it has returned, meters.
-    pub home_m: f32,
+    #[serde(alias = "home_m")]
+    pub returned_distance_m: f32,
     /// Following distance to its guardian, meters.
-    pub follow_m: f32,
+    #[serde(alias = "follow_m")]
+    pub follow_distance_m: f32,
     /// Minimum length of an escape, meters.
-    pub run_min_m: f32,
+    #[serde(alias = "run_min_m")]
+    pub escape_min_m: f32,
     /// Minimum angle between the escape and the guardian's direction, radians: 60 degrees.
-    pub off_rad: f32,
+    #[serde(alias = "off_rad")]
+    pub escape_min_angle_rad: f32,
     /// The same if the target is far from the guardian, radians: 30 degrees.
-    pub off_far_rad: f32,
+    #[serde(alias = "off_far_rad")]
+    pub escape_min_angle_far_rad: f32,
     /// Distance from the guardian that counts as far, meters.
-    pub far_m: f32,
+    #[serde(alias = "far_m")]
+    pub far_from_guardian_m: f32,
     /// Minimum distance of the target from the bounds, meters: 6 cells of the original's map.
-    pub border_m: f32,
+    #[serde(alias = "border_m")]
+    pub bounds_margin_m: f32,
     /// Radius around the target without known obstacles, meters. Ours: room for the child.
-    pub free_m: f32,
+    #[serde(alias = "free_m")]
+    pub target_clearance_m: f32,
     /// Arrival distance, meters. Ours: slightly more than a step.
-    pub there_m: f32,
+    #[serde(alias = "there_m")]
+    pub arrival_distance_m: f32,
 }
 
 impl TimeRules {
     /// Values of both rule sets.
     pub const STANDARD: TimeRules = TimeRules {
-        reconsider_frames: 40,
-        partner_holds_frames: 300,
-        spare_frames: 240,
-        walk_factor: 1.5,
+        replan_interval_frames: 40,
+        partner_load_valid_frames: 300,
+        delivery_reserve_frames: 240,
+        path_time_factor: 1.5,
         pick_and_put_frames: 130,
     };
 }
 
-impl PlanLimits {
+impl PlanTimeouts {
     /// Values of both rule sets.
-    pub const STANDARD: PlanLimits = PlanLimits {
+    pub const STANDARD: PlanTimeouts = PlanTimeouts {
         explore_frames: 250,
         interact_frames: 1000,
         follow_partner_frames: 250,
@@ -168,24 +195,24 @@ impl FailureRules {
     /// Values of both rule sets.
     pub const STANDARD: FailureRules = FailureRules {
         ignore_frames: 500,
-        lift_tries: 5,
-        places_tried: 4,
-        bad_place_frames: 800,
+        max_failed_lifts: 5,
+        max_positions_tried: 4,
+        failed_position_frames: 800,
         unreachable_frames: 250,
-        held_for_sure_frames: 60,
+        held_refusal_ignore_frames: 60,
         impossible_frames: 2000,
-        barred_frames: 1000,
+        repeated_collision_frames: 1000,
     };
 }
 
 impl LiftingRules {
     /// Values of both rule sets.
     pub const STANDARD: LiftingRules = LiftingRules {
-        at_piece_m: 1.5,
-        at_piece_frames: 150,
-        call_frames: 300,
-        left_piece_m: 3.0,
-        tries_together: 8,
+        partner_at_furniture_m: 1.5,
+        partner_sighting_max_age_frames: 150,
+        help_request_frames: 300,
+        partner_left_furniture_m: 3.0,
+        max_failed_joint_lifts: 8,
     };
 }
 
@@ -196,7 +223,7 @@ impl PeopleRules {
         child_within_m: 1.9,
         child_beside_m: 2.3,
         child_stand_frames: 30,
-        child_trust_frames: 250,
+        child_return_frames: 250,
         fresh_frames: 50,
         child_apart_in_view_m: 3.5,
         child_apart_remembered_m: 5.5,
@@ -206,18 +233,18 @@ impl PeopleRules {
 impl ChildRules {
     /// Values of both rule sets.
     pub const STANDARD: ChildRules = ChildRules {
-        plan_frames: 100,
-        run_chance: 0.2,
-        caught_m: 2.5,
-        home_m: 3.0,
-        follow_m: 2.0,
-        run_min_m: 5.0,
-        off_rad: std::f32::consts::FRAC_PI_3,
-        off_far_rad: std::f32::consts::FRAC_PI_6,
-        far_m: 10.0,
-        border_m: 0.75,
-        free_m: 1.0,
-        there_m: 0.5,
+        decision_interval_frames: 100,
+        escape_probability: 0.2,
+        turn_back_distance_m: 2.5,
+        returned_distance_m: 3.0,
+        follow_distance_m: 2.0,
+        escape_min_m: 5.0,
+        escape_min_angle_rad: std::f32::consts::FRAC_PI_3,
+        escape_min_angle_far_rad: std::f32::consts::FRAC_PI_6,
+        far_from_guardian_m: 10.0,
+        bounds_margin_m: 0.75,
+        target_clearance_m: 1.0,
+        arrival_distance_m: 0.5,
     };
 }
 
@@ -232,4 +259,4 @@ macro_rules! standard_by_default {
     )*};
 }
 
-standard_by_default!(TimeRules, PlanLimits, FailureRules, LiftingRules, PeopleRules, ChildRules);
+standard_by_default!(TimeRules, PlanTimeouts, FailureRules, LiftingRules, PeopleRules, ChildRules);

@@ -28,7 +28,7 @@ pub struct RuleProfile {
     /// True if it removes the obstacles that its body can lift.
     pub removes_obstacles: bool,
     /// True if it takes care of the child.
-    pub minds_child: bool,
+    pub supervises_child: bool,
     /// True if it helps the partner lift objects that are too heavy for one.
     pub lifts_together: bool,
     /// True if its own pick-ups count under the original's bookkeeping.
@@ -47,7 +47,7 @@ impl RuleProfile {
         target_filter: TargetFilter::ByGoal,
         target_order: TargetOrder::Nearest,
         removes_obstacles: false,
-        minds_child: false,
+        supervises_child: false,
         lifts_together: false,
         counts_picks: true,
         container_above: 0.5,
@@ -65,7 +65,7 @@ impl RuleProfile {
     pub const RHP: RuleProfile = RuleProfile {
         target_filter: TargetFilter::AnyPossible,
         removes_obstacles: true,
-        minds_child: true,
+        supervises_child: true,
         lifts_together: true,
         counts_picks: false,
         ..RuleProfile::PARTNER

@@ -117,19 +117,19 @@ impl Scenario {
 
 #[test]
 fn the_first_plan_is_to_look_around() {
-    for (looks_around_first, expected) in [(true, Plan::TurnAround), (false, Plan::Explore)] {
-        let s = Scenario::new(PlannerRules { looks_around_first, ..PAPER });
+    for (initial_look_around, expected) in [(true, Plan::TurnAround), (false, Plan::Explore)] {
+        let s = Scenario::new(PlannerRules { initial_look_around, ..PAPER });
         assert_eq!(s.evaluate(|rules, context| rules.decide(context, &s.valid)), expected);
     }
 }
 
 #[test]
 fn a_plan_is_reconsidered_after_changes_or_not() {
-    for reconsiders in [true, false] {
-        let s = Scenario::new(PlannerRules { reconsiders, ..PAPER });
+    for replans in [true, false] {
+        let s = Scenario::new(PlannerRules { replans, ..PAPER });
         let reconsidered =
             s.evaluate(|rules, context| rules.reconsiders(context, &Plan::Explore, true));
-        assert_eq!(reconsidered, reconsiders);
+        assert_eq!(reconsidered, replans);
     }
 }
 
@@ -188,8 +188,8 @@ fn distant_objects_are_ignored_for_lack_of_time() {
     toy.add(ToyObject::new("bed", [3.0, 0.0, -4.0], [1.0, 0.5, 1.0]));
     toy.stand([0.0, 0.0], 0.0);
     let apple = Plan::PickUp(subject("apple", apple.0));
-    for (weighs_time, expected) in [(true, Plan::Explore), (false, apple)] {
-        let mut s = Scenario::new(PlannerRules { weighs_time, ..PAPER });
+    for (checks_time_to_deliver, expected) in [(true, Plan::Explore), (false, apple)] {
+        let mut s = Scenario::new(PlannerRules { checks_time_to_deliver, ..PAPER });
         s.briefing.bounds = toy.bounds();
         s.briefing.goal_places = vec![ClassId::named("bed")];
         s.memory = Memory::new(&s.briefing, s.memory.rules);
@@ -219,7 +219,7 @@ fn memory_of(class: &str, rules: PlannerRules) -> (Memory, Briefing, TrackId) {
 fn a_failure_makes_an_object_ignored_for_a_limited_time() {
     // Rules, reason of the failure, and frame from which the object is available again.
     let any = PlannerRules { any_failure_counts: true, ..PAPER };
-    let longer = PlannerRules { held_frames: 500, ..PAPER };
+    let longer = PlannerRules { seen_held_ignore_frames: 500, ..PAPER };
     for (rules, reason, from) in [
         (PAPER, FailureReason::OutOfReach, 0),
         (any, FailureReason::OutOfReach, 500),
@@ -237,8 +237,8 @@ fn a_failure_makes_an_object_ignored_for_a_limited_time() {
 
 #[test]
 fn a_goal_place_is_ignored_after_a_failed_put_on() {
-    for (goal_blackout_frames, expected) in [(0, [1, 1]), (500, [0, 1])] {
-        let rules = PlannerRules { goal_blackout_frames, ..PAPER };
+    for (failed_goal_place_frames, expected) in [(0, [1, 1]), (500, [0, 1])] {
+        let rules = PlannerRules { failed_goal_place_frames, ..PAPER };
         let (mut memory, briefing, bed) = memory_of("bed", rules);
         let action = Action::PutOn { place: bed, hand: Hand::Left };
         let failed = Outcome::Failure(FailureReason::BeyondLimits);
@@ -253,8 +253,8 @@ fn a_goal_place_is_ignored_after_a_failed_put_on() {
 
 #[test]
 fn a_failed_put_on_or_a_timeout_ends_the_delivery_and_the_place_is_ignored() {
-    let deliver = |goal_blackout_frames| {
-        let rules = PlannerRules { goal_blackout_frames, put_within_m: 5.0, ..PAPER };
+    let deliver = |failed_goal_place_frames| {
+        let rules = PlannerRules { failed_goal_place_frames, put_within_m: 5.0, ..PAPER };
         let (memory, briefing, bed) = memory_of("bed", rules);
         let mut s = Scenario::new(rules);
         (s.memory, s.briefing) = (memory, briefing);
@@ -264,9 +264,9 @@ fn a_failed_put_on_or_a_timeout_ends_the_delivery_and_the_place_is_ignored() {
         assert_eq!(act, Progress::Act(Action::PutOn { place: bed, hand: Hand::Right }));
         (s, executor, bed)
     };
-    for (goal_blackout_frames, ends) in [(0, false), (500, true)] {
+    for (failed_goal_place_frames, ends) in [(0, false), (500, true)] {
         // The left hand's put-on failed, and the right hand still holds an apple.
-        let (mut s, mut executor, place) = deliver(goal_blackout_frames);
+        let (mut s, mut executor, place) = deliver(failed_goal_place_frames);
         let last = (
             Action::PutOn { place, hand: Hand::Left },
             Outcome::Failure(FailureReason::BeyondLimits),
@@ -277,11 +277,11 @@ fn a_failed_put_on_or_a_timeout_ends_the_delivery_and_the_place_is_ignored() {
         assert_eq!(progress == Progress::Failed, ends, "{progress:?}");
         assert_eq!(s.memory.goal_places().is_empty(), ends);
 
-        let (mut s, mut executor, _) = deliver(goal_blackout_frames);
-        s.memory.frame += s.memory.rules.limits.interact_frames + 1;
+        let (mut s, mut executor, _) = deliver(failed_goal_place_frames);
+        s.memory.frame += s.memory.rules.plan_timeouts.interact_frames + 1;
         assert_eq!(s.continue_plan(&mut executor, Plan::Deliver), Progress::Failed);
         assert_eq!(s.memory.goal_places().is_empty(), ends);
-        s.memory.frame += goal_blackout_frames;
+        s.memory.frame += failed_goal_place_frames;
         assert_eq!(s.memory.goal_places().len(), 1);
     }
 }
@@ -324,8 +324,8 @@ fn only_helpers_without_perfect_segmentation_miss_people_and_know_less() {
 
 #[test]
 fn looking_around_takes_the_number_of_turns_in_the_rules() {
-    for around_turns in [PAPER.around_turns, PlannerRules::compat().around_turns] {
-        let mut s = Scenario::new(PlannerRules { around_turns, ..PAPER });
-        assert_eq!(s.n_turns_around(), around_turns);
+    for look_around_turns in [PAPER.look_around_turns, PlannerRules::compat().look_around_turns] {
+        let mut s = Scenario::new(PlannerRules { look_around_turns, ..PAPER });
+        assert_eq!(s.n_turns_around(), look_around_turns);
     }
 }

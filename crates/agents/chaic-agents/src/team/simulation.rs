@@ -399,7 +399,8 @@ impl<'a> Simulation<'a> {
         let is_full = partner.n_free(worker, capacity) == 0;
         let time = problem.rules.time;
         let is_far = frames_left
-            < time.walk_factor * Self::walk_frames(goal_m, worker) + time.spare_frames as f32;
+            < time.path_time_factor * Self::walk_frames(goal_m, worker)
+                + time.delivery_reserve_frames as f32;
         let carries = partner.n_carried() > 0;
         let must_deliver = carries && (is_full || fraction_left < worker.deliver_below || is_far);
         let container = || {

@@ -9,14 +9,14 @@ const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../docs/rules.md"
 #[test]
 fn single_rules_are_set_by_value_and_by_set() -> Result<()> {
     let rules = RuleSet::COMPAT
-        .with("world.durations.refused_pick=5")?
+        .with("world.durations.refused_pick_up=5")?
         .with("world.blocking=paper")?
-        .with("planner.goal_blackout_frames=0")?
-        .with("planner.time.reconsider_frames=80")?;
-    assert_eq!(rules.world.durations.refused_pick, 5);
+        .with("planner.failed_goal_place_frames=0")?
+        .with("planner.time.replan_interval_frames=80")?;
+    assert_eq!(rules.world.durations.refused_pick_up, 5);
     assert_eq!(rules.world.blocking, Rules::paper().blocking);
-    assert_eq!(rules.planner.goal_blackout_frames, 0);
-    assert_eq!(rules.planner.time.reconsider_frames, 80);
+    assert_eq!(rules.planner.failed_goal_place_frames, 0);
+    assert_eq!(rules.planner.time.replan_interval_frames, 80);
     assert_eq!(rules.name, RuleSetName::Compat);
     assert_eq!(rules.planner.walking, PlannerRules::compat().walking);
     Ok(())
@@ -33,11 +33,33 @@ fn a_wrong_setting_is_refused_with_the_expected_values() {
         ("world.turn_rad=0", "0.01 to 3.14"),
         ("world.turn_rad=-0.3", "0.01 to 3.14"),
         ("planner.exploration=nowhere", "frontier"),
-        ("world.dropped_counts=1", "false"),
+        ("world.failed_put_on_can_deliver=1", "false"),
     ] {
         let error = RuleSet::PAPER.with(setting).expect_err(setting).to_string();
         assert!(error.contains(setting) && error.contains(expected), "{error}");
     }
+}
+
+#[test]
+fn earlier_names_of_rules_are_read_and_refused_with_the_current_ones() {
+    let mut earlier = RuleSet::COMPAT.to_value();
+    let names = rule_names();
+    // Names of groups come last, so that their rules are found.
+    let mut renamed = renamed::RENAMED_RULES;
+    renamed.sort_by_key(|(old, _)| *old == "planner.limits");
+    for (old, new) in renamed {
+        let is_rule =
+            |name: &str| names.iter().any(|n| n == name || n.starts_with(&format!("{name}.")));
+        assert!(is_rule(new) && !is_rule(old), "{old}: {new}");
+        let (group, new_key) = new.rsplit_once('.').unwrap();
+        let group = earlier.pointer_mut(&format!("/{}", group.replace('.', "/"))).unwrap();
+        let group = group.as_object_mut().unwrap();
+        let value = group.remove(new_key).unwrap();
+        group.insert(old.rsplit_once('.').unwrap().1.to_owned(), value);
+    }
+    assert_eq!(serde_json::from_value::<RuleSet>(earlier).unwrap(), RuleSet::COMPAT);
+    let error = RuleSet::PAPER.with("planner.limits.wait_frames=3").unwrap_err().to_string();
+    assert!(error.contains("`planner.plan_timeouts.wait_frames`"), "{error}");
 }
 
 #[test]
@@ -52,7 +74,7 @@ fn the_sets_differ_in_exactly_the_listed_rules() -> Result<()> {
         assert_ne!(paper, compat, "{name}");
         assert_ne!(RuleSet::COMPAT.with(&format!("{name}={paper}"))?, RuleSet::COMPAT);
     }
-    assert!(differing.iter().any(|n| n == "world.durations.refused_pick"));
+    assert!(differing.iter().any(|n| n == "world.durations.refused_pick_up"));
     assert!(!differing.iter().any(|n| n == "world.stride_m"));
     assert!(rule_values("world.durations").is_err() && rule_values("world.gravity").is_err());
     Ok(())
@@ -111,7 +133,7 @@ fn old_listings_without_rule_groups_are_read_with_default_values() {
     for rules in [RuleSet::PAPER, RuleSet::COMPAT] {
         let mut listing = rules.to_value();
         let planner = listing["planner"].as_object_mut().expect("a struct");
-        for group in ["time", "limits", "failures", "lifting", "people", "child"] {
+        for group in ["time", "plan_timeouts", "failures", "lifting", "people", "child"] {
             assert!(planner.remove(group).is_some(), "{group}");
         }
         assert_eq!(serde_json::from_value::<RuleSet>(listing).expect("readable"), rules);

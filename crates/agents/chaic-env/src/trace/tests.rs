@@ -149,9 +149,9 @@ fn another_format_and_impossible_rules_are_refused() {
     assert!(problem(&other).contains("its format is `chaic-run`"), "{}", problem(&other));
     let mut wrong = [RuleSet::PAPER; 3];
     wrong[0].world.turn_rad = 13.0;
-    wrong[1].world.durations.gap = u32::MAX;
+    wrong[1].world.durations.pause = u32::MAX;
     wrong[2].world.durations.open_hand = 0;
-    for (rules, name) in wrong.into_iter().zip(["turn_rad", "gap", "open_hand"]) {
+    for (rules, name) in wrong.into_iter().zip(["turn_rad", "pause", "open_hand"]) {
         let line = serde_json::to_string(&Header { rules, ..header() }).unwrap();
         assert!(problem(&(line + "\n")).contains(name), "{name}");
     }
@@ -208,6 +208,8 @@ fn lines_have_the_keys_of_their_version() {
         thought,
         r#""mode":"x","last_observed":"partner picked up apple #31","perceived":[["t31","apple",[120,80,-35]]],"belief":{"goals":[["fruit",750],["bread",250]],"people":[["child",1000]],"extra":["key"],"position_cm":[120,-35],"evidence":["took apple #31"]}}]"#
     );
+    let (sensors, thought) = sensors_and_thought(3);
+    assert!(sensors.contains("frame_history") && thought.contains("last_observed"));
     let (sensors, thought) = sensors_and_thought(2);
     assert_eq!(
         sensors,
@@ -217,6 +219,18 @@ fn lines_have_the_keys_of_their_version() {
         thought,
         r#""mood":"x","noticed":"partner picked up apple #31","sees":[["t31","apple",[120,80,-35]]],"belief":{"goals":[["fruit",750],["bread",250]],"people":[["child",1000]],"extra":["key"],"position_cm":[120,-35],"evidence":["took apple #31"]}}]"#
     );
+}
+
+#[test]
+fn headers_have_the_rules_of_their_version() {
+    let header = |version| trace_with_renamed_keys(version).lines().next().unwrap();
+    for (old, new) in
+        [("gap", "pause"), ("held_frames", "seen_held_ignore_frames"), ("limits", "plan_timeouts")]
+    {
+        let has = |version, key: &str| header(version).contains(&format!("\"{key}\":"));
+        assert!(has(VERSION, new) && !has(VERSION, old), "{old}");
+        assert!(has(3, old) && !has(3, new), "{old}");
+    }
 }
 
 #[test]

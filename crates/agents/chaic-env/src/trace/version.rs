@@ -1,6 +1,8 @@
-//! Keys of older versions of the format.
+//! Keys of older versions of the format. Reading accepts them by `serde(alias)`.
 
-/// Keys of version 2 and their names since version 3. Reading accepts both by `serde(alias)`.
+use crate::rules::renamed::RENAMED_RULES;
+
+/// Keys of version 2 and their names since version 3.
 const RENAMED_IN_3: [(&str, &str); 6] = [
     ("senses", "sensors"),
     ("film", "frame_history"),
@@ -11,14 +13,29 @@ const RENAMED_IN_3: [(&str, &str); 6] = [
 ];
 
 /// Returns a line that has the keys of the current version with the keys of `version`.
-///
-/// Each renamed key follows another entry of its object. `,"KEY":` cannot occur inside a JSON string,
-/// where quotes are escaped.
 pub(super) fn with_keys_of(version: u32, line: String) -> String {
-    if version >= 3 {
-        return line;
+    let mut line = line;
+    if version < 4 && line.contains(",\"rules\":") {
+        for (old, new) in RENAMED_RULES {
+            line = with_key(line, last_part(new), last_part(old));
+        }
     }
-    RENAMED_IN_3.iter().fold(line, |line, (old, new)| {
-        line.replace(&format!(",\"{new}\":"), &format!(",\"{old}\":"))
+    if version < 3 {
+        for (old, new) in RENAMED_IN_3 {
+            line = with_key(line, new, old);
+        }
+    }
+    line
+}
+
+/// Replaces a key of all objects of a line. `,"KEY":` and `{"KEY":` cannot occur inside a JSON string,
+/// where quotes are escaped.
+fn with_key(line: String, from: &str, to: &str) -> String {
+    ["{", ","].iter().fold(line, |line, before| {
+        line.replace(&format!("{before}\"{from}\":"), &format!("{before}\"{to}\":"))
     })
+}
+
+fn last_part(name: &str) -> &str {
+    name.rsplit('.').next().unwrap_or(name)
 }

@@ -64,14 +64,14 @@ impl PromptContext {
             horizon: briefing.horizon,
             frames_per_10_m: (10.0 / speed / 10.0).round() as u32 * 10,
             me: body(&briefing.capability),
-            told: briefing.disclosure.filter(|_| track == PromptTrack::Told).map(|disclosure| {
-                DisclosedFacts {
+            told: briefing.disclosure.filter(|_| track == PromptTrack::KnownTask).map(
+                |disclosure| DisclosedFacts {
                     task: disclosure.task.name(),
                     partner: person(disclosure.partner),
                     reach: reach(&disclosure.partner.capability()),
                     strength_kg: disclosure.partner.capability().strength_kg as u32,
-                }
-            }),
+                },
+            ),
             wanted: wanted
                 .flat_map(|goal| &goal.targets)
                 .map(|(class, n)| Count { name: plain(class.info().label), count: *n })
@@ -327,7 +327,7 @@ fn map(context: &Context<'_>, length: Length) -> Map {
         let note = if memory.frame < object.held_until {
             Some("in somebody's hands".to_owned())
         } else if memory.frame < object.ignore_until {
-            Some("you tried in vain lately".to_owned())
+            Some("your recent attempt failed".to_owned())
         } else if info.role == Role::Fragile {
             Some("fragile".to_owned())
         } else if info.role == Role::HeavyTarget {

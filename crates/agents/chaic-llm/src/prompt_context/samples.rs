@@ -132,7 +132,7 @@ impl PromptContext {
             }
         };
         let alone = |track| PromptContext { others: Vec::new(), ..empty(track) };
-        let tracks = [PromptTrack::Hidden, PromptTrack::Told, PromptTrack::Partner];
+        let tracks = [PromptTrack::Hidden, PromptTrack::KnownTask, PromptTrack::Partner];
         tracks.into_iter().flat_map(|t| [full(t), empty(t), alone(t)]).collect()
     }
 }

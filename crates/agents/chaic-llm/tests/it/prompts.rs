@@ -22,7 +22,7 @@ fn prompts_fit_the_limit_until_the_end_of_long_episodes() {
     let fixture = Fixture::new(&[TaskId::HighTarget, TaskId::Shopping, TaskId::MovingHouse], 3000);
     let (_standin, settings) = standin(Options::default());
     let language = LanguageHelpers::live(settings, flag()).unwrap();
-    assert!(fixture.play("run", &fixture.request(&["llm-told"]), &language).0);
+    assert!(fixture.play("run", &fixture.request(&["llm_known_task"]), &language).0);
     let mut n = 0;
     for record in fixture.records("run") {
         for exchange in exchanges(&record) {
@@ -69,7 +69,7 @@ fn prompts_of_the_hidden_track_name_neither_task_nor_constraint_nor_goal() {
     let fixture = Fixture::new(&tasks, 100);
     let (_standin, settings) = standin(Options::default());
     let language = LanguageHelpers::live(settings, flag()).unwrap();
-    assert!(fixture.play("run", &fixture.request(&["llm", "llm-told"]), &language).0);
+    assert!(fixture.play("run", &fixture.request(&["llm", "llm_known_task"]), &language).0);
     let mut openings = Vec::new();
     for record in fixture.records("run") {
         let exchanges = exchanges(&record);

@@ -20,7 +20,7 @@ fn a_replay_is_identical_bit_for_bit() {
     let (standin, mut settings) = standin(Options::default());
     // The charge for thinking is part of the record.
     settings.asking.frames_per_second = 200.0;
-    let request = fixture.request(&["none", "llm", "llm-told", "vlm"]);
+    let request = fixture.request(&["none", "llm", "llm_known_task", "vlm"]);
     let language = LanguageHelpers::live(settings, flag()).unwrap();
     let (is_complete, results) = fixture.play("live", &request, &language);
     assert!(is_complete && results.len() == 8);
@@ -55,7 +55,10 @@ fn a_replay_is_identical_bit_for_bit() {
         let path = fixture.path("live/traces/shopping").join(helper).join("short-0-s0.jsonl");
         std::fs::read_to_string(path).unwrap().lines().next().unwrap().to_owned()
     };
-    assert!(trace("llm-told").contains("\"task\":true") && !trace("llm").contains("\"task\":true"));
+    assert!(
+        trace("llm_known_task").contains("\"task\":true")
+            && !trace("llm").contains("\"task\":true")
+    );
 }
 
 #[test]
@@ -117,7 +120,7 @@ fn answered_requests_are_not_repeated_after_a_pause() {
 #[test]
 fn budgets_are_exceeded_by_one_request_at_most_and_the_fallback_continues() {
     let fixture = Fixture::new(&[TaskId::NoConstraint, TaskId::HighTarget, TaskId::Obstacle], 300);
-    let request = fixture.request(&["llm", "llm-told"]);
+    let request = fixture.request(&["llm", "llm_known_task"]);
     for (k, money) in [None, Some(0.004)].into_iter().enumerate() {
         let (standin, mut settings) = standin(Options::default());
         settings.budget.then = FaultAction::Fallback;
@@ -261,7 +264,7 @@ fn requests_in_flight_do_not_block_other_episodes() {
     settings.endpoint.timeout_secs = 600.0;
     settings.endpoint.in_flight = 16;
     let language = LanguageHelpers::live(settings, flag()).unwrap();
-    let mut request = fixture.request(&["none", "random", "llm", "llm-told"]);
+    let mut request = fixture.request(&["none", "random", "llm", "llm_known_task"]);
     request.seeds = Some(2);
     let path = fixture.path("run");
     let access = chaic_eval::run::FolderMode::New;

@@ -90,9 +90,9 @@ pub struct EvalArguments {
     /// the same [default: canonical].
     #[arg(long, value_name = "APPEARANCE")]
     pub appearance: Option<Appearance>,
-    /// Track: told allows all grants. hidden limits helpers to images, their own body and goal_place,
+    /// Track: unrestricted allows all grants. hidden limits helpers to images, their own body and goal_place,
     /// requires learned perception and behavior, and refuses rules that disclose hidden state;
-    /// docs/grants.md [default: told].
+    /// docs/grants.md [default: unrestricted].
     #[arg(long, value_name = "NAME")]
     pub track: Option<Track>,
     /// Object detection of helpers: gt (ids from ground truth), learned (the built-in detector),

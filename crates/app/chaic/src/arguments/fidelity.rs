@@ -55,8 +55,8 @@ pub struct FidelityArguments {
     /// Play nothing; write the document from the runs in --out.
     #[arg(long, conflicts_with_all = ["resume", "episodes"])]
     pub only_document: bool,
-    /// Markdown document to write, with its figures in `images` next to it. The text between its marks of
-    /// causes is kept [default: fidelity.md in --out].
+    /// Markdown document to write, with its figures in `images` next to it. Text between `<!-- causes` and
+    /// `<!-- end of causes -->` in an existing document is kept [default: fidelity.md in --out].
     #[arg(long, value_name = "FILE")]
     pub doc: Option<PathBuf>,
 }

@@ -35,7 +35,7 @@ pub enum LlmCommand {
         #[arg(long)]
         brief: bool,
     },
-    /// Send a short test question to the endpoint.
+    /// Send two test questions to the endpoint: one with a JSON schema, one as text.
     Check {
         #[command(flatten)]
         language: LanguageArguments,

@@ -22,7 +22,7 @@ pub struct CollectOpponentArguments {
 /// `chaic eval opponent`.
 #[derive(Args, Debug)]
 pub struct OpponentArguments {
-    /// Weights: a safetensors file.
+    /// Weights: a safetensors file of an opponent model, or of a policy that includes one.
     #[arg(long, value_name = "FILE")]
     pub weights: PathBuf,
     #[command(flatten)]

@@ -11,7 +11,7 @@ use chaic_vision::coco;
 use serde_json::json;
 
 use super::datasets::{clip_config, collect_clips, dataset_split, view_config};
-use super::{bars, jobs, opponent};
+use super::{bars, jobs, opponent, run_perception};
 use crate::arguments::{CollectBehaviorArguments, CollectCommand, CollectDetectionArguments};
 use crate::exit::ExitStatus;
 use crate::interrupt;
@@ -69,9 +69,12 @@ fn detection(arguments: &CollectDetectionArguments, format: OutputFormat) -> Res
 
 fn behavior(arguments: &CollectBehaviorArguments, format: OutputFormat) -> Result<ExitStatus> {
     let split = dataset_split(arguments.split);
-    let folder = ClipFolder::open(&arguments.out, split, &clip_config(&arguments.clips))?;
+    let config = clip_config(&arguments.clips);
+    let perception = run_perception::perception_by_name(Some(&arguments.clips.perception), None)?;
+    let folder = ClipFolder::open(&arguments.out, split, &config, &*perception)?;
     let stop = interrupt::stop_flag()?;
-    let Some(clips) = collect_clips(&arguments.clips, split, Some(&folder), stop)? else {
+    let clips = collect_clips(&arguments.clips, &*perception, split, Some(&folder), stop)?;
+    let Some(clips) = clips else {
         print_error("stopped; run the same command again to continue");
         return Ok(ExitStatus::Interrupted);
     };

@@ -3,6 +3,7 @@
 use std::sync::atomic::AtomicBool;
 
 use anyhow::Result;
+use chaic_agents::perception_factory::PerceptionFactory;
 use chaic_episodes::DatasetSplit;
 use chaic_vision::behavior::clip::Clip;
 use chaic_vision::behavior::collect::{Collector, collect};
@@ -10,7 +11,7 @@ use chaic_vision::behavior::config::ClipCollectionConfig;
 use chaic_vision::behavior::store::ClipFolder;
 use chaic_vision::views::ViewConfig;
 
-use super::{bars, jobs, run_perception};
+use super::{bars, jobs};
 use crate::arguments::{AppearanceArgument, ClipArguments, SceneSelection, SplitArgument};
 
 /// Returns the part of the data that an option names.
@@ -50,18 +51,17 @@ pub fn clip_config(arguments: &ClipArguments) -> ClipCollectionConfig {
 /// Plays episodes and returns their clips; `None` if it was stopped.
 ///
 /// # Errors
-/// If the perception is unknown, or the file system refuses.
+/// If the file system refuses.
 pub fn collect_clips(
     arguments: &ClipArguments,
+    perception: &dyn PerceptionFactory,
     split: DatasetSplit,
     folder: Option<&ClipFolder>,
     stop: &AtomicBool,
 ) -> Result<Option<Vec<Clip>>> {
-    let perception = run_perception::perception_by_name(Some(&arguments.perception), None)?;
     let bar = bars::count_bar(u64::from(arguments.n_episodes), "episodes");
     let (config, n_threads) = (clip_config(arguments), jobs(arguments.jobs));
-    let collector =
-        Collector { split, config: &config, perception: &*perception, n_threads, folder };
+    let collector = Collector { split, config: &config, perception, n_threads, folder };
     let clips = collect(&collector, &mut |n, _| bar.set_position(n as u64), stop);
     bar.finish_and_clear();
     Ok(clips?)

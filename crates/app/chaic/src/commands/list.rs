@@ -45,9 +45,9 @@ fn description(name: &str) -> &'static str {
     match name {
         NONE => "no helper; the partner works alone",
         "llm" => "language model on text",
-        "llm-told" => "the same; task and constraint known",
+        "llm_known_task" => "the same; task and constraint known",
         "vlm" => "language model on text and images",
-        "vlm-told" => "the same; task and constraint known",
+        "vlm_known_task" => "the same; task and constraint known",
         name => match (HelperInfo::find_helper(name), BundledHelper::find(name)) {
             (Some(info), _) => info.about,
             (None, Some(bundled)) => bundled.about,
@@ -61,7 +61,9 @@ fn grants(name: &str) -> Vec<&'static str> {
     let grants = match HelperInfo::find_helper(name) {
         Some(info) => (info.grants)(RuleSet::PAPER.planner),
         None if name == NONE => Grants::NONE,
-        None if name.ends_with("-told") => Grants { behavior: true, task: true, ..Grants::PLANNER },
+        None if name.ends_with("_known_task") => {
+            Grants { behavior: true, task: true, ..Grants::PLANNER }
+        }
         None => BundledHelper::find(name).map_or(Grants::PLANNER, BundledHelper::grants),
     };
     let given = grants.named().into_iter().filter(|(_, is_given)| *is_given);

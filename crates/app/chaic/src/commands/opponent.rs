@@ -2,9 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context as _, Result};
+use chaic_eval::EvalError;
 use chaic_files::read_user_file;
 use chaic_learn::opponent::OpponentGoal;
 use chaic_learn::opponent::collect::{
@@ -12,6 +14,8 @@ use chaic_learn::opponent::collect::{
 };
 use chaic_learn::opponent::network::OpponentModel;
 use chaic_learn::opponent::report::OpponentReport;
+use chaic_learn::policy_kind::PolicyWeights;
+use chaic_learn::visual::helper::VisualWeights;
 use serde_json::json;
 
 use super::datasets::dataset_split;
@@ -31,10 +35,11 @@ pub fn collect_windows(
 ) -> Result<ExitStatus> {
     let stop = interrupt::stop_flag()?;
     let split = dataset_split(arguments.split);
-    let Some(windows) = play(&arguments.windows, split, stop)? else {
+    let config = collection(&arguments.windows);
+    let Some(windows) = play(&config, split, stop)? else {
         return Ok(ExitStatus::Interrupted);
     };
-    write(&arguments.out, &windows)?;
+    write(&arguments.out, &windows, arguments.windows.grant_behavior)?;
     let mut text = String::new();
     let mut counts = BTreeMap::new();
     for goal in OpponentGoal::ALL {
@@ -51,7 +56,16 @@ pub fn collect_windows(
 pub fn evaluate(arguments: &OpponentArguments, format: OutputFormat) -> Result<ExitStatus> {
     let model = read_model(&arguments.weights)?;
     let stop = interrupt::stop_flag()?;
-    let windows = play(&arguments.windows, DatasetSplit::Test, stop)?;
+    let mut config = collection(&arguments.windows);
+    if config.granted && !model.is_granted() {
+        return Err(EvalError::Options(format!(
+            "--grant-behavior: {} was trained without the partner's actions; leave the option out",
+            quoted_path(&arguments.weights)
+        ))
+        .into());
+    }
+    config.granted = model.is_granted();
+    let windows = play(&config, DatasetSplit::Test, stop)?;
     let report = windows.and_then(|windows| OpponentReport::new(&model, &windows, stop));
     let Some(report) = report else { return Ok(ExitStatus::Interrupted) };
     print_result(format, &report, &report.text())?;
@@ -59,18 +73,22 @@ pub fn evaluate(arguments: &OpponentArguments, format: OutputFormat) -> Result<E
     Ok(ExitStatus::Success)
 }
 
-fn read_model(path: &Path) -> Result<OpponentModel> {
+/// Reads an opponent model, or that of a policy which includes one.
+fn read_model(path: &Path) -> Result<Arc<OpponentModel>> {
     let bytes = read_user_file(path, MAX_BYTES)?;
-    OpponentModel::from_bytes(&bytes).with_context(|| path.display().to_string())
+    let of_policy = || PolicyWeights::from_bytes(&bytes).ok()?.opponent;
+    let of_visual_policy = || VisualWeights::from_bytes(&bytes).ok()?.opponent;
+    match of_policy().or_else(of_visual_policy) {
+        Some(model) => Ok(model),
+        None => Ok(Arc::new(
+            OpponentModel::from_bytes(&bytes).with_context(|| path.display().to_string())?,
+        )),
+    }
 }
 
-/// Plays episodes of a part of the data and returns their windows; `None` if it was stopped.
-fn play(
-    arguments: &WindowArguments,
-    split: DatasetSplit,
-    stop: &AtomicBool,
-) -> Result<Option<Vec<LabeledWindow>>> {
-    let config = WindowCollectionConfig {
+/// Returns the collection that these options describe.
+fn collection(arguments: &WindowArguments) -> WindowCollectionConfig {
+    WindowCollectionConfig {
         max_per_class: arguments.max_per_class as usize,
         episodes: arguments.n_episodes as usize,
         image_size: arguments.size,
@@ -78,15 +96,24 @@ fn play(
         behavior: arguments.behavior.clone(),
         granted: arguments.grant_behavior,
         ..WindowCollectionConfig::default()
-    };
-    let bar = bars::count_bar(u64::from(arguments.n_episodes), "episodes");
+    }
+}
+
+/// Plays episodes of a part of the data and returns their windows; `None` if it was stopped.
+fn play(
+    config: &WindowCollectionConfig,
+    split: DatasetSplit,
+    stop: &AtomicBool,
+) -> Result<Option<Vec<LabeledWindow>>> {
+    config.check().map_err(EvalError::Options)?;
+    let bar = bars::count_bar(config.episodes as u64, "episodes");
     let mut progress = |message: &str| {
         bar.set_message(message.to_owned());
         if bar.is_hidden() {
             print_progress(message);
         }
     };
-    let windows = collect(split, &config, &mut progress, stop);
+    let windows = collect(split, config, &mut progress, stop);
     bar.finish_and_clear();
     let windows = windows?;
     if windows.is_none() {

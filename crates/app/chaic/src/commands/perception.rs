@@ -63,7 +63,8 @@ pub fn evaluate_behavior(
         None => TrainedBehavior::built_in(),
     };
     let stop = interrupt::stop_flag()?;
-    let clips = collect_clips(&arguments.clips, DatasetSplit::Test, None, stop)?;
+    let perception = run_perception::perception_by_name(Some(&arguments.clips.perception), None)?;
+    let clips = collect_clips(&arguments.clips, &*perception, DatasetSplit::Test, None, stop)?;
     let n_threads = jobs(arguments.clips.jobs);
     let report = clips.and_then(|clips| behavior_report(&network, &clips, n_threads, stop));
     let Some(report) = report else { return Ok(ExitStatus::Interrupted) };

@@ -37,7 +37,8 @@ pub fn run(
     let clock = Box::new(move || start.elapsed().as_secs());
     let stop = interrupt::stop_flag()?;
     let helpers = own_helpers::registry(arguments, &plan, launcher, stop)?;
-    let server = StudyServer::open(plan, &options, helpers, clock, Box::new(print_warning))?;
+    let server = StudyServer::open(plan, &options, helpers, clock, Box::new(print_warning))
+        .map_err(own_helpers::with_hint)?;
     let url = format!("http://{}/", server.address());
     let counts = server.counts();
     let text = format!(
@@ -79,12 +80,12 @@ mod own_helpers {
 
     use anyhow::Result;
     use chaic_agents::perception_factory::GroundTruthPerceptionFactory;
-    use chaic_env::helper_registry::{BuiltInHelpers, HelperRegistry, find};
-    use chaic_env::rules::RuleSet;
+    use chaic_env::helper_registry::{BuiltInHelpers, HelperRegistry};
     use chaic_eval::EvalError;
     use chaic_learn::helpers::{NamedPolicy, PolicyRegistry};
     use chaic_sandbox::Launcher;
     use chaic_study::{Simulator, StudyPlan};
+    use chaic_study_server::ServerError;
     use chaic_subprocess::CommandRegistry;
 
     use crate::arguments::{HelperArgument, StudyServeArguments};
@@ -134,15 +135,17 @@ mod own_helpers {
         let policies =
             PolicyRegistry::bundled(&BuiltInHelpers, perception).with_policies(policies)?;
         let policies = Box::leak(Box::new(policies));
-        let registry = Box::leak(Box::new(CommandRegistry::new(policies, programs, stop)?));
-        if plan.study().play.simulator == Simulator::Server {
-            for name in plan.helpers() {
-                find(registry, name, RuleSet::PAPER.planner).map_err(|problem| {
-                    invalid(&format!("{problem}; give your own with --helper NAME=exec:COMMAND"))
-                })?;
+        Ok(Box::leak(Box::new(CommandRegistry::new(policies, programs, stop)?)))
+    }
+
+    /// Tells how the server gets a helper that it lacks.
+    pub(super) fn with_hint(error: ServerError) -> anyhow::Error {
+        match error {
+            ServerError::Helper(problem) => {
+                invalid(&format!("{problem}; give your own with --helper NAME=exec:COMMAND"))
             }
+            error => error.into(),
         }
-        Ok(registry)
     }
 
     fn invalid(problem: &str) -> anyhow::Error {

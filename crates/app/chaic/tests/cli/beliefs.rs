@@ -55,7 +55,7 @@ fn beliefs_are_explained_drawn_and_scored() {
 fn losses_are_reported_with_another_partner_too() {
     let dir = short_episodes();
     let at = dir.path();
-    let helpers = "none,rhp,infer,infer_told,oracle_plan";
+    let helpers = "none,rhp,infer,infer_known_goal,oracle_plan";
     let eval = ["eval", "--episodes", "short", "--helper", helpers, "--size", "32", "--out", "run"];
     run_ok(at, &[&eval[..], &["--partner", "farthest"]].concat());
     let recorded = fs::read_to_string(at.join("run/run.json")).expect("a text file");

@@ -221,7 +221,11 @@ fn exit_codes_agree_with_the_documentation() {
         (&["eval", "--resume", "--out", "nowhere"], 1, "no run.json"),
         (&["episodes", "validate", "nowhere.json"], 1, "can't open nowhere.json"),
         (&["render", "obstacle/test/99", "--out", "x"], 2, "obstacle/test/99"),
-        (&[&usage[..], &["--helper", "nobody"]].concat(), 2, "oracle_plan, llm, llm-told, vlm"),
+        (
+            &[&usage[..], &["--helper", "nobody"]].concat(),
+            2,
+            "oracle_plan, llm, llm_known_task, vlm",
+        ),
         (&[&usage[..], &["--partner", "nobody"]].concat(), 2, "the partners are rules, farthest"),
         (&[&usage[..], &["--seeds", "0"]].concat(), 2, "0 is not in 1..="),
         (&["eval", "--nonsense"], 2, "--nonsense"),

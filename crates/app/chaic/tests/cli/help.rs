@@ -77,7 +77,10 @@ fn misspelled_names_have_suggestions() {
         (&["eval", "--helper", "none,orakel", "--out", "r"][..], "did you mean `oracle`?"),
         (&["eval", "--task", "shoping", "--out", "r"], "did you mean `shopping`?"),
         (&["eval", "--partner", "rule", "--out", "r"], "did you mean `rules`?"),
-        (&["eval", "--set", "world.droped_counts=true", "--out", "r"], "`world.dropped_counts`?"),
+        (
+            &["eval", "--set", "world.failed_put_on_can_delivr=true", "--out", "r"],
+            "`world.failed_put_on_can_deliver`?",
+        ),
         (&["eval", "--helper", "exec:true", "--exec-grants", "goals"], "did you mean `goal`?"),
         (&["fidelity", "--episodes", "e", "--task", "obstacles", "--out", "f"], "`obstacle`?"),
         (&["helper", "serve", "randm"], "did you mean `random`?"),

@@ -84,7 +84,7 @@ fn lists_name_everything_that_options_take() {
         assert!(!refused.contains("unknown partner"), "{refused}");
     }
     assert_eq!(names("tasks").len(), 12);
-    assert!(names("rules").contains(&"world.dropped_counts".to_owned()));
+    assert!(names("rules").contains(&"world.failed_put_on_can_deliver".to_owned()));
     let people = json(at, &["list", "people"]);
     assert_eq!(people["people"].as_array().map(Vec::len), Some(6));
     assert_eq!(people["impairments"].as_array().map(Vec::len), Some(4));

@@ -173,7 +173,7 @@ fn the_hidden_track_uses_images_alone_and_replays_show_detections() {
     assert!(run_ok(dir, &["report", "run"]).contains("Track hidden"));
     run_ok(dir, &["verify", "run"]);
     run_ok(dir, &["eval", "--resume", "--track", "hidden", "--out", "run"]);
-    let error = run_err(dir, &["eval", "--resume", "--track", "told", "--out", "run"]);
+    let error = run_err(dir, &["eval", "--resume", "--track", "unrestricted", "--out", "run"]);
     assert!(error.contains("--track"), "{error}");
     run_ok(dir, &["merge", "--out", "merged", "run"]);
     let merged = fs::read_to_string(dir.join("merged/run.json")).unwrap();
@@ -210,16 +210,16 @@ fn the_hidden_track_refuses_grants_of_every_kind_of_helper() {
     let error = refused(&["--helper", "none,rhp,oracle"]);
     assert!(error.contains("`oracle` is granted goal, progress, behavior"), "{error}");
     let endpoint = ["--endpoint", "http://127.0.0.1:9/v1", "--model", "none", "--llm-key-env", ""];
-    let error = refused(&[&["--helper", "llm-told"], &endpoint[..]].concat());
-    assert!(error.contains("`llm-told` is granted task"), "{error}");
+    let error = refused(&[&["--helper", "llm_known_task"], &endpoint[..]].concat());
+    assert!(error.contains("`llm_known_task` is granted task"), "{error}");
     for sight in [["--perception", "gt"], ["--behavior", "gt"]] {
         let error = refused(&[&["--helper", "mine=exec:true"], &sight[..]].concat());
         assert!(error.contains("hidden track needs"), "{error}");
     }
     let error = refused(&["--helper", "mine=exec:true", "--rules", "compat"]);
     assert!(error.contains("--set world.joint_lift=paper"), "{error}");
-    let error = refused(&["--helper", "rhp", "--set", "planner.knows_holding=true"]);
-    assert!(error.contains("planner.knows_holding"), "{error}");
+    let error = refused(&["--helper", "rhp", "--set", "planner.knows_partner_behavior=true"]);
+    assert!(error.contains("planner.knows_partner_behavior"), "{error}");
 }
 
 #[test]

@@ -151,7 +151,7 @@ fn a_killed_training_was_locked_and_resumes_with_the_same_curves() {
     let at = folder.path();
     let few = ["--of-each", "20", "--episodes", "1", "--image-size", "32"];
     run_ok(at, &[&["collect", "opponent", "--out", "w"][..], &few].concat());
-    let small = "steps = 800\nwarm_up = 1\nbatch_size = 8\nvalidation_max_per_class = 5\nwindows = \"w\"\n\
+    let small = "steps = 300\nwarm_up = 1\nbatch_size = 8\nvalidation_max_per_class = 5\nwindows = \"w\"\n\
                  [collect]\nepisodes = 1\nimage_size = 32\n";
     fs::write(at.join("c.toml"), small).expect("it is written");
     let train = ["train", "opponent", "--config", "c.toml", "--out"];

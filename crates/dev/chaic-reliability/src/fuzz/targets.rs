@@ -299,7 +299,7 @@ fn repair_frame(bytes: &mut [u8]) {
 }
 
 fn windows(inputs: &Inputs, bytes: &[u8]) -> Result<(), String> {
-    read_from_user_path(&file(inputs, "windows", bytes)).map(drop).map_err(message)
+    read_from_user_path(&file(inputs, "windows", bytes), false).map(drop).map_err(message)
 }
 
 fn commitment(_: &Inputs, bytes: &[u8]) -> Result<(), String> {

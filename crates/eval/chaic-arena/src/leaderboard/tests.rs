@@ -92,10 +92,11 @@ fn leaderboard(entries: Vec<ConfirmedEntry>) -> Leaderboard {
 
 #[test]
 fn rows_of_different_rules_are_in_different_tables() {
-    let (told, hidden, other) = (rules("a", "told"), rules("a", "hidden"), rules("b", "told"));
-    let size = EvaluationConditions { size: Some(64), ..told.clone() };
-    let version = EvaluationConditions { chaic: "0.2.0".to_owned(), ..told.clone() };
-    let all = [&told, &hidden, &other, &size, &version];
+    let (unrestricted, hidden, other) =
+        (rules("a", "unrestricted"), rules("a", "hidden"), rules("b", "unrestricted"));
+    let size = EvaluationConditions { size: Some(64), ..unrestricted.clone() };
+    let version = EvaluationConditions { chaic: "0.2.0".to_owned(), ..unrestricted.clone() };
+    let all = [&unrestricted, &hidden, &other, &size, &version];
     let entries = all.iter().enumerate().flat_map(|(k, rules)| {
         [entry(&format!("m{k}"), rules, [5; 6]), entry(&format!("n{k}"), rules, [6; 6])]
     });
@@ -113,12 +114,12 @@ fn rows_of_different_rules_are_in_different_tables() {
 
 #[test]
 fn differences_are_paired_with_rhp_and_adjusted() {
-    let told = rules("a", "told");
+    let unrestricted = rules("a", "unrestricted");
     // RHP has 4, 5, 4, 5, 4, 5 tenths.
     let board = leaderboard(vec![
-        entry("same", &told, [4, 5, 4, 5, 4, 5]),
-        entry("better", &told, [6, 7, 5, 8, 6, 6]),
-        entry("unsure", &told, [9, 1, 5, 5, 4, 6]),
+        entry("same", &unrestricted, [4, 5, 4, 5, 4, 5]),
+        entry("better", &unrestricted, [6, 7, 5, 8, 6, 6]),
+        entry("unsure", &unrestricted, [9, 1, 5, 5, 4, 6]),
     ]);
     let [table] = &board.tables[..] else { panic!("one table") };
     assert_eq!((table.reference.as_str(), table.environments), ("rhp", 6));
@@ -140,15 +141,15 @@ fn differences_are_paired_with_rhp_and_adjusted() {
 
 #[test]
 fn repeated_and_contradictory_evaluations_are_refused() {
-    let told = rules("a", "told");
-    let mut cheater = entry("cheater", &told, [9; 6]);
+    let unrestricted = rules("a", "unrestricted");
+    let mut cheater = entry("cheater", &unrestricted, [9; 6]);
     let of_none = cheater.results.iter_mut().find(|result| result.key.helper == NONE);
     *of_none.expect("it played") = result(NONE, 0, 0);
     let board = leaderboard(vec![
-        entry("first", &told, [5; 6]),
-        entry("first", &told, [5; 6]),
+        entry("first", &unrestricted, [5; 6]),
+        entry("first", &unrestricted, [5; 6]),
         cheater,
-        entry("last", &told, [3; 6]),
+        entry("last", &unrestricted, [3; 6]),
     ]);
     assert_eq!(board.n_submissions(), 2);
     let reasons: Vec<&str> = board.refused.iter().map(|entry| entry.reason.as_str()).collect();
@@ -160,7 +161,7 @@ fn repeated_and_contradictory_evaluations_are_refused() {
 #[test]
 fn texts_cannot_add_markup_and_the_page_loads_nothing() {
     let mut builder = LeaderboardBuilder::default();
-    builder.add_entry(Path::new("x"), entry("mine", &rules(EVIL, "told"), [5; 6]));
+    builder.add_entry(Path::new("x"), entry("mine", &rules(EVIL, "unrestricted"), [5; 6]));
     builder.refuse(Path::new(EVIL), &format!("{EVIL}/run: {EVIL}"));
     let page = builder.build().to_html(EVIL);
     assert_eq!(page.matches("<script").count(), 0, "{page}");

@@ -13,7 +13,7 @@ const DONE: [(&str, [f64; 2]); 6] = [
     ("rhp", [3.0, 4.0]),
     ("infer", [4.0, 6.0]),
     ("oracle", [6.0, 5.0]),
-    ("infer_told", [7.0, 7.0]),
+    ("infer_known_goal", [7.0, 7.0]),
     ("oracle_plan", [8.0, 10.0]),
 ];
 
@@ -26,7 +26,7 @@ fn losses(helpers: &[&str]) -> Result<Losses, String> {
     let helpers: Vec<String> = helpers.iter().map(|h| (*h).to_owned()).collect();
     let grants = |helper: &String| match helper.as_str() {
         "oracle" => Grants::ORACLE,
-        "infer_told" => Grants { goal: true, ..Grants::PLANNER },
+        "infer_known_goal" => Grants { goal: true, ..Grants::PLANNER },
         "ideal_observer" => Grants { state: true, ..Grants::PLANNER },
         "oracle_plan" => Grants::ALL,
         _ => Grants::PLANNER,
@@ -55,13 +55,13 @@ fn the_grants_of_a_helper_decide_its_references() {
     let all = DONE.map(|(helper, _)| helper);
     let losses = losses(&all).unwrap();
     let listed: Vec<&str> = losses.helpers.iter().map(|h| h.helper.as_str()).collect();
-    assert_eq!(listed, ["rhp", "infer", "oracle", "infer_told"]);
-    // Means: rhp 0.35, infer 0.5, oracle 0.55, infer_told 0.7, oracle_plan 0.9.
+    assert_eq!(listed, ["rhp", "infer", "oracle", "infer_known_goal"]);
+    // Means: rhp 0.35, infer 0.5, oracle 0.55, infer_known_goal 0.7, oracle_plan 0.9.
     let expected = [("total", 0.55), ("search", 0.2), ("inference", 0.2), ("planning", 0.15)];
     assert_eq!(means(&losses, "rhp"), expected);
     assert_eq!(means(&losses, "infer"), [("total", 0.4), ("search", 0.2), ("inference", 0.2)]);
     assert_eq!(means(&losses, "oracle"), [("total", 0.35), ("search", 0.2), ("planning", 0.15)]);
-    assert_eq!(means(&losses, "infer_told"), [("total", 0.2), ("search", 0.2)]);
+    assert_eq!(means(&losses, "infer_known_goal"), [("total", 0.2), ("search", 0.2)]);
     let interval = losses.helpers[0].losses[0].tasks[&TaskId::LowTarget];
     assert!(interval.low < 0.55 && 0.55 < interval.high, "{interval:?}");
 }
@@ -84,7 +84,7 @@ fn every_format_has_every_loss() {
 #[test]
 fn missing_references_are_named() {
     let message = losses(&["none", "rhp", "oracle", "oracle_plan"]).unwrap_err();
-    assert!(message.contains("infer, infer_told in the same run"), "{message}");
-    let message = losses(&["ideal_observer", "rhp", "infer", "infer_told"]).unwrap_err();
+    assert!(message.contains("infer, infer_known_goal in the same run"), "{message}");
+    let message = losses(&["ideal_observer", "rhp", "infer", "infer_known_goal"]).unwrap_err();
     assert!(message.contains("the helpers oracle_plan in"), "{message}");
 }

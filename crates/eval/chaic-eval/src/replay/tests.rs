@@ -78,7 +78,7 @@ fn a_belief_adds_bars_and_a_ring_on_the_map() {
 
 #[test]
 fn own_helpers_are_preferred_then_the_strongest_of_the_table() {
-    let order = ["nearest", "infer", "rhp", "none", "infer_told"];
+    let order = ["nearest", "infer", "rhp", "none", "infer_known_goal"];
     let ranks = order.map(preference);
     assert!(ranks.is_sorted_by(|a, b| a < b), "{ranks:?}");
 }

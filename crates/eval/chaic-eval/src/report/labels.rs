@@ -183,9 +183,9 @@ const EXTERNAL_TITLES: [(&str, &str); 10] = [
     ("smart_help", "Smart-Help"),
     ("smart_help_plus", "Smart-Help+"),
     ("llm", "LLM"),
-    ("llm-told", "LLM, told"),
+    ("llm_known_task", "LLM, known task"),
     ("vlm", "VLM"),
-    ("vlm-told", "VLM, told"),
+    ("vlm_known_task", "VLM, known task"),
 ];
 
 /// Returns the title of a helper in tables.

@@ -1,5 +1,6 @@
 //! Collection of labeled windows from generated episodes.
 
+use std::collections::HashMap;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -200,7 +201,8 @@ fn windows_of_episode(
     let task = config.tasks[index as usize % config.tasks.len()];
     let seed = SeedRange::opponent_model(split).first + u64::from(index);
     let id = format!("{}/gen/{seed}", task.name());
-    let episode = find_episode(&id).map_err(RolloutError::from)?;
+    // Seeds without a valid episode are skipped.
+    let Ok(episode) = find_episode(&id) else { return Ok(Vec::new()) };
     let setup = episode.setup();
     let planner = RuleSet::PAPER.planner;
     let partner_plan: Arc<Mutex<Option<ReportedPlan>>> = Arc::default();
@@ -211,7 +213,7 @@ fn windows_of_episode(
     } else {
         Box::new(partners::policy(persona, task.info().scene))
     };
-    let partner = PlanReporter { policy, plan: Arc::clone(&partner_plan) };
+    let partner = PlanReporter { policy, plan: Arc::clone(&partner_plan), reconsidered: None };
     let partner =
         Helper { agent: Box::new(PlanningAgent::new(partner, planner)), grants: PARTNER_GRANTS };
     let capability =
@@ -256,6 +258,8 @@ struct ReportedPlan {
 struct PlanReporter {
     policy: Box<dyn Policy>,
     plan: Arc<Mutex<Option<ReportedPlan>>>,
+    /// Current plan, while the policy decides whether to replace it.
+    reconsidered: Option<Plan>,
 }
 
 impl PlanReporter {
@@ -272,13 +276,20 @@ impl Policy for PlanReporter {
 
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
         let plan = self.policy.choose(context, valid)?;
-        self.report(plan, context.memory.frame + self.policy.thinking_frames());
+        let current = self.reconsidered.take();
+        // The agent goes on with a plan that the new one does not supersede.
+        match current.filter(|current| !self.policy.supersedes(&plan, current)) {
+            Some(current) => self.report(current, 0),
+            None => self.report(plan, context.memory.frame + self.policy.thinking_frames()),
+        }
         Ok(plan)
     }
 
-    fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, is_news: bool) -> bool {
+    fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, has_changed: bool) -> bool {
         self.report(*current, 0);
-        self.policy.reconsiders(context, current, is_news)
+        let is_due = self.policy.reconsiders(context, current, has_changed);
+        self.reconsidered = is_due.then_some(*current);
+        is_due
     }
 
     fn thinking_frames(&self) -> Frame {
@@ -341,8 +352,8 @@ impl<P: Policy> Policy for RecordingPolicy<P> {
         self.policy.choose(context, valid)
     }
 
-    fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, is_news: bool) -> bool {
-        self.policy.reconsiders(context, current, is_news)
+    fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, has_changed: bool) -> bool {
+        self.policy.reconsiders(context, current, has_changed)
     }
 
     fn observe(&mut self, _: &Observation, memory: &Memory, behavior: &BehaviorLog) {
@@ -369,6 +380,8 @@ impl<P: Policy> Policy for RecordingPolicy<P> {
     }
 }
 
+/// Key of the metadata of a file of windows.
+const GRANTED: &str = "granted";
 /// Maximum size of a file of windows, bytes.
 const MAX_BYTES: u64 = 1 << 33;
 
@@ -376,9 +389,12 @@ const MAX_BYTES: u64 = 1 << 33;
 /// `n_choices`, `goal` (by [`OpponentGoal::index`]), `target` (candidate index or -1), `limits`
 /// (5), `episode`. The rows of `choices` (31 features) are the candidates of all windows in order.
 ///
+/// The metadata `granted` says whether the partner's actions were granted, so that a model is not
+/// trained or evaluated with the wrong ones.
+///
 /// # Errors
 /// If the file cannot be written.
-pub fn write(path: &Path, samples: &[LabeledWindow]) -> Result<(), FileError> {
+pub fn write(path: &Path, samples: &[LabeledWindow], is_granted: bool) -> Result<(), FileError> {
     let f32_bytes = |values: &mut dyn Iterator<Item = f32>| -> Vec<u8> {
         values.flat_map(f32::to_le_bytes).collect()
     };
@@ -414,7 +430,8 @@ pub fn write(path: &Path, samples: &[LabeledWindow]) -> Result<(), FileError> {
         let view = TensorView::new(*dtype, shape.clone(), bytes);
         (*name, view.expect("the length matches the shape"))
     });
-    let bytes = serialize(views, None).expect("names and shapes can be encoded");
+    let metadata = HashMap::from([(GRANTED.to_owned(), is_granted.to_string())]);
+    let bytes = serialize(views, Some(metadata)).expect("names and shapes can be encoded");
     write_atomically(path, &bytes)
 }
 
@@ -429,9 +446,26 @@ pub fn read(path: &Path) -> Result<Vec<LabeledWindow>, CollectError> {
 /// Reads windows from a file that a user named, which may be a link.
 ///
 /// # Errors
-/// If the file cannot be read or holds no windows.
-pub fn read_from_user_path(path: &Path) -> Result<Vec<LabeledWindow>, CollectError> {
-    parse_file(path, &read_user_file(path, MAX_BYTES)?)
+/// If the file cannot be read, holds no windows, or says that the partner's actions were granted
+/// although `is_granted` is false, or the reverse.
+pub fn read_from_user_path(
+    path: &Path,
+    is_granted: bool,
+) -> Result<Vec<LabeledWindow>, CollectError> {
+    let bytes = read_user_file(path, MAX_BYTES)?;
+    let windows = parse_file(path, &bytes)?;
+    let metadata = SafeTensors::read_metadata(&bytes).ok();
+    let metadata = metadata.as_ref().and_then(|(_, metadata)| metadata.metadata().as_ref());
+    // Files of earlier versions have no metadata.
+    match metadata.and_then(|metadata| metadata.get(GRANTED)) {
+        Some(granted) if *granted != is_granted.to_string() => Err(CollectError::Format {
+            path: path.to_owned(),
+            problem: format!(
+                "collected with `granted = {granted}`, but the training has `collect.granted = {is_granted}`"
+            ),
+        }),
+        _ => Ok(windows),
+    }
 }
 
 fn parse_file(path: &Path, bytes: &[u8]) -> Result<Vec<LabeledWindow>, CollectError> {

@@ -53,9 +53,6 @@ impl OpponentReport {
         let (mut goals, mut targets, mut errors) = (Vec::new(), Vec::new(), Vec::new());
         let mut limit_errors = [0.0; N_LIMITS];
         let mut bins = [(0.0, 0.0, 0.0); N_BINS];
-        let mut counts = [0.0; N_GOALS];
-        samples.iter().for_each(|s| counts[s.goal.index()] += 1.0);
-        let n_goals = counts.iter().filter(|n| **n > 0.0).count() as f64;
         for sample in samples {
             if stop.load(Ordering::Relaxed) {
                 return None;
@@ -65,8 +62,7 @@ impl OpponentReport {
             let goal = sample.goal.index();
             confusion[goal][predicted] += 1;
             let is_correct = f64::from(u8::from(predicted == goal));
-            let weight = samples.len() as f64 / (counts[goal] * n_goals);
-            goals.push((sample.episode, is_correct * weight));
+            goals.push((sample.episode, goal, is_correct));
             let confidence = f64::from(prediction.goals[predicted]);
             let bin = &mut bins[((confidence * N_BINS as f64) as usize).min(N_BINS - 1)];
             *bin = (bin.0 + 1.0, bin.1 + confidence, bin.2 + is_correct);
@@ -87,7 +83,7 @@ impl OpponentReport {
         let gap =
             bins.iter().map(|(_, confidence, correct)| f64::abs(confidence - correct)).sum::<f64>();
         Some(OpponentReport {
-            goal_accuracy: clustered_mean(&goals),
+            goal_accuracy: balanced_accuracy(&goals),
             target_accuracy: clustered_mean(&targets),
             limits_error: clustered_mean(&errors),
             error_by_limit: LIMITS.into_iter().zip(limit_errors).collect(),
@@ -138,6 +134,26 @@ fn argmax(values: &[f32]) -> usize {
     best
 }
 
+/// Returns the mean over goals of the fraction of their windows that are correct, from rows of
+/// episode, goal and correctness (0 or 1).
+fn balanced_accuracy(windows: &[(u32, usize, f64)]) -> MeanEstimate {
+    let mut by_goal: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
+    for (_, goal, is_correct) in windows {
+        let (n, n_correct) = by_goal.entry(*goal).or_default();
+        (*n, *n_correct) = (*n + 1.0, *n_correct + is_correct);
+    }
+    if by_goal.is_empty() {
+        return MeanEstimate::default();
+    }
+    let n_goals = by_goal.len() as f64;
+    let mean = by_goal.values().map(|(n, n_correct)| n_correct / n).sum::<f64>() / n_goals;
+    let residuals = windows.iter().map(|(episode, goal, is_correct)| {
+        let (n, n_correct) = by_goal[goal];
+        (*episode, (is_correct - n_correct / n) / (n * n_goals))
+    });
+    MeanEstimate { mean, standard_error: clustered_error(residuals), n: windows.len() }
+}
+
 /// Returns the mean of clustered values, with the standard error of a ratio of cluster sums.
 fn clustered_mean(samples: &[(u32, f64)]) -> MeanEstimate {
     let n = samples.len();
@@ -145,11 +161,39 @@ fn clustered_mean(samples: &[(u32, f64)]) -> MeanEstimate {
         return MeanEstimate::default();
     }
     let mean = samples.iter().map(|(_, x)| x).sum::<f64>() / n as f64;
+    let residuals = samples.iter().map(|(episode, x)| (*episode, (x - mean) / n as f64));
+    MeanEstimate { mean, standard_error: clustered_error(residuals), n }
+}
+
+/// Returns the standard error of an estimate from the influence of each window on it, with the windows
+/// of an episode as one cluster; infinite for one episode.
+fn clustered_error(residuals: impl Iterator<Item = (u32, f64)>) -> f64 {
     let mut clusters: BTreeMap<u32, f64> = BTreeMap::new();
-    samples.iter().for_each(|(cluster, x)| *clusters.entry(*cluster).or_default() += x - mean);
+    residuals.for_each(|(episode, x)| *clusters.entry(episode).or_default() += x);
     let k = clusters.len() as f64;
     let square: f64 = clusters.values().map(|sum| sum * sum).sum();
-    let standard_error =
-        if k > 1.0 { (square * k / (k - 1.0)).sqrt() / n as f64 } else { f64::INFINITY };
-    MeanEstimate { mean, standard_error, n }
+    if k > 1.0 { (square * k / (k - 1.0)).sqrt() } else { f64::INFINITY }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_error_of_the_balanced_accuracy_is_that_of_its_goals() {
+        // All correct: no error, although the goals have different numbers of windows.
+        let mut windows: Vec<_> = (0..9).map(|episode| (episode, 0, 1.0)).collect();
+        windows.push((9, 1, 1.0));
+        let perfect = balanced_accuracy(&windows);
+        assert_eq!((perfect.mean, perfect.standard_error, perfect.n), (1.0, 0.0, 10));
+        // One goal with half of four windows correct, each in an episode of its own, and one with all.
+        let half: Vec<_> =
+            (0..8).map(|k| (k, k as usize / 4, f64::from(u8::from(k > 1)))).collect();
+        let half = balanced_accuracy(&half);
+        assert_eq!(half.mean, 0.75);
+        let expected = (4.0f64 * (0.5 / 8.0) * (0.5 / 8.0) * 8.0 / 7.0).sqrt();
+        assert!((half.standard_error - expected).abs() < 1e-12);
+        assert_eq!(balanced_accuracy(&[]), MeanEstimate::default());
+        assert_eq!(balanced_accuracy(&[(0, 0, 1.0), (0, 1, 0.0)]).standard_error, f64::INFINITY);
+    }
 }

@@ -176,7 +176,8 @@ impl Trainer for OpponentTrainer {
             let path = folder.join(name);
             let user_file = config.windows.as_ref().filter(|_| split == DatasetSplit::Train);
             if let Some(user_file) = user_file {
-                windows.push(read_from_user_path(user_file).map_err(TrainingError::from_data)?);
+                let windows_of_user = read_from_user_path(user_file, config.collect.granted);
+                windows.push(windows_of_user.map_err(TrainingError::from_data)?);
                 continue;
             }
             if kind(&path)? != EntryKind::Missing {
@@ -191,7 +192,7 @@ impl Trainer for OpponentTrainer {
             let collected =
                 collect(split, &collected, progress, stop).map_err(TrainingError::from_data)?;
             let Some(collected) = collected else { return Ok(None) };
-            write(&path, &collected)?;
+            write(&path, &collected, config.collect.granted)?;
             windows.push(collected);
         }
         let (validation, samples) = (windows.remove(1), windows.remove(0));
@@ -200,7 +201,8 @@ impl Trainer for OpponentTrainer {
 
     fn check(config: &OpponentConfig) -> Result<(), String> {
         if let Some(path) = &config.windows {
-            let windows = read_from_user_path(path).map_err(|e| e.to_string())?;
+            let windows = read_from_user_path(path, config.collect.granted);
+            let windows = windows.map_err(|e| e.to_string())?;
             if windows.is_empty() {
                 return Err(format!("{}: {}", path.display(), CollectError::Empty));
             }

@@ -106,7 +106,7 @@ impl Policy for LearnedPartnerPolicy {
     }
 
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, has_changed: bool) -> bool {
-        let interval = context.memory.rules.time.reconsider_frames;
+        let interval = context.memory.rules.time.replan_interval_frames;
         let is_due = match current {
             Plan::Deliver | Plan::PutIn | Plan::LiftWith(_) | Plan::TurnAround => false,
             _ => has_changed || context.memory.frame >= self.encoder.last_frame() + interval,

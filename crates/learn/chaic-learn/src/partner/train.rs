@@ -10,7 +10,7 @@ use chaic_core::rng::RngStream;
 use chaic_env::Digest;
 use chaic_env::helper_registry::{BuiltInHelpers, HelperRegistry as _, NONE};
 use chaic_env::recording::Recording;
-use chaic_episodes::{SeedRange, find_episode};
+use chaic_episodes::find_episode;
 use chaic_nn::weights::{self, WeightsError};
 use chaic_nn::{AdamWConfig, Network};
 use chaic_training::bounds::{
@@ -34,7 +34,9 @@ use crate::cloning::{CloningMetrics, Demonstration, FitConfig, fit};
 use crate::demonstrations::Demonstrations;
 use crate::ppo::MAX_BATCH;
 use crate::rollout::RolloutError;
-use crate::rollout_config::{GENERATORS, MAX_VALIDATION_EPISODES, check_splits};
+use crate::rollout_config::{
+    GENERATORS, MAX_VALIDATION_EPISODES, check_splits, draw_episode, validation_ids,
+};
 
 /// Section of a checkpoint.
 const ITERATIONS: &str = "partner.iterations";
@@ -163,8 +165,8 @@ impl PartnerCloningConfig {
         let task = self.tasks[index as usize % self.tasks.len()];
         let round = index as usize / self.tasks.len() / self.helpers.len();
         let split = &self.splits[round % self.splits.len()];
-        let mut rng = RngStream::new(self.seed, "demonstration episodes", index);
-        let id = format!("{task}/{split}/{}", SeedRange::POLICY_TRAIN.draw(&mut rng));
+        let rng = RngStream::new(self.seed, "demonstration episodes", index);
+        let id = draw_episode(task, split, rng);
         self.drawn(id, "demonstrated habits", index)
     }
 
@@ -173,15 +175,14 @@ impl PartnerCloningConfig {
         if let Some(recordings) = self.read_recordings(Part::Validation)? {
             return Ok(recordings.iter().map(|recording| self.recorded(recording)).collect());
         }
-        let first = SeedRange::POLICY_VALIDATION.first;
         let split = self.splits.last().map_or(GENERATORS[0], String::as_str);
-        let n_tasks = self.tasks.len() as u64;
-        let episode = |index: u64| {
-            let task = self.tasks[(index % n_tasks) as usize];
-            let id = format!("{task}/{split}/{}", first + index / n_tasks);
-            self.drawn(id, "validation habits", index)
-        };
-        Ok((0..n_tasks * self.validation_episodes as u64).map(episode).collect())
+        let ids = self.tasks.iter().map(|t| validation_ids(*t, split, self.validation_episodes));
+        let ids: Vec<Vec<String>> = ids.collect();
+        // The tasks take turns.
+        let in_turn =
+            (0..self.validation_episodes).flat_map(|k| ids.iter().filter_map(move |i| i.get(k)));
+        let episodes = in_turn.zip(0..);
+        Ok(episodes.map(|(id, index)| self.drawn(id.clone(), "validation habits", index)).collect())
     }
 }
 

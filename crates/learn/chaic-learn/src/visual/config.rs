@@ -7,14 +7,13 @@ use chaic_agents::perception_factory::{GROUND_TRUTH, PerceptionFactory};
 use chaic_core::TaskId;
 use chaic_core::rng::RngStream;
 use chaic_env::RewardWeights;
-use chaic_episodes::SeedRange;
 use chaic_vision::perception_registry::{self, PerceptionError};
 use serde::{Deserialize, Serialize};
 
 use super::actions::ActionSpace;
 use crate::ppo::PpoConfig;
 use crate::reward_config;
-use crate::rollout_config::GENERATORS;
+use crate::rollout_config::{GENERATORS, draw_episode};
 
 /// Configuration of `chaic train visual`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -89,7 +88,6 @@ impl VisualConfig {
         let index = k * self.n_envs as u64 + slot as u64;
         let task = self.tasks[index as usize % self.tasks.len()];
         let split = &self.splits[index as usize / self.tasks.len() % self.splits.len()];
-        let seed = SeedRange::POLICY_TRAIN.draw(&mut RngStream::new(self.seed, "episodes", index));
-        format!("{task}/{split}/{seed}")
+        draw_episode(task, split, RngStream::new(self.seed, "episodes", index))
     }
 }

@@ -134,7 +134,12 @@ impl Trainer for VisualTrainer {
         let opponent = read_opponent(config.opponent.as_deref()).ok().flatten();
         let model =
             VisualNetwork::new(config.action_space, OpponentInput::from_model(opponent.as_ref()));
-        weights::from_bytes(model.network(), weights, &model.kind())
+        let mut parameters = weights::from_bytes(model.network(), weights, &model.kind())?;
+        // The rollouts use the model of the configuration, whatever the weights contain.
+        if let (Some(range), Some(opponent)) = (model.opponent_range(), &opponent) {
+            parameters[range].copy_from_slice(opponent.parameters());
+        }
+        Ok(parameters)
     }
 
     fn network(&self) -> &Network {
@@ -177,7 +182,17 @@ impl Trainer for VisualTrainer {
             return Err(CheckpointError::section(UPDATES, format!("is {updates}")));
         }
         let progress = read_progress(&self.setup.config, updates, checkpoint)?;
+        let before = self.learner.state();
         self.learner.load(checkpoint)?;
+        let TrainingSetup { model, opponent, .. } = &self.setup;
+        if let (Some(range), Some(opponent)) = (model.opponent_range(), opponent)
+            && self.learner.parameters[range] != *opponent.parameters()
+        {
+            self.learner.set_state(before);
+            return Err(CheckpointError::Data(
+                "the file of `opponent` has changed since the training began".to_owned(),
+            ));
+        }
         let runners = replay(&self.setup, &progress, stop);
         let runners = runners.map_err(|e| CheckpointError::section(ACTION_INDICES, e))?;
         let Some(runners) = runners else { return Ok(None) };

@@ -8,7 +8,7 @@ use chaic_core::TaskId;
 use chaic_core::capability::Persona;
 use chaic_learn::candidate_scorer::CandidateSet;
 use chaic_learn::opponent::collect::{
-    DatasetSplit, LabeledWindow, WindowCollectionConfig, collect, read, write,
+    DatasetSplit, LabeledWindow, WindowCollectionConfig, collect, read, read_from_user_path, write,
 };
 use chaic_learn::opponent::network::{OpponentModel, network};
 use chaic_learn::opponent::report::OpponentReport;
@@ -58,8 +58,11 @@ fn windows_are_within_bounds_and_read_back_unchanged() {
     );
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("windows.safetensors");
-    write(&path, &samples).unwrap();
+    write(&path, &samples, true).unwrap();
     assert!(samples == read(&path).unwrap());
+    assert!(samples == read_from_user_path(&path, true).unwrap());
+    let problem = read_from_user_path(&path, false).unwrap_err().to_string();
+    assert!(problem.contains("granted = true"), "{problem}");
     let bytes = fs::read(&path).unwrap();
     for n in [0, 7, bytes.len() / 2, bytes.len() - 1] {
         fs::write(&path, &bytes[..n]).unwrap();
@@ -203,7 +206,7 @@ fn damaged_checkpoints_and_values_out_of_bounds_are_refused() {
 fn windows_that_cannot_be_read_are_refused_before_the_folder_is_created() {
     let folder = tempfile::tempdir().unwrap();
     let (out, empty) = (folder.path().join("out"), folder.path().join("empty"));
-    write(&empty, &[]).unwrap();
+    write(&empty, &[], false).unwrap();
     for (windows, word) in [(folder.path().join("missing"), "missing"), (empty, "no windows")] {
         let config = OpponentConfig { windows: Some(windows), ..OpponentConfig::default() };
         let started =

@@ -77,8 +77,8 @@ fn interrupted_trainings_end_with_the_same_bits() {
         iterations: 2,
         n_steps: 5,
         rollout: RolloutConfig {
-            proposals: true,
-            memory: 4,
+            infer_hint: true,
+            n_past_decisions: 4,
             partners: vec!["slow".to_owned()],
             ..small_rollout()
         },
@@ -123,7 +123,7 @@ fn experts_generators_and_penalties_are_checked_before_a_training() {
     assert!(problem.contains("kl_coef") && problem.contains("--weights"), "{problem}");
     assert!(!out.exists());
     for (text, words) in [
-        ("[teacher]\nhelper = \"follow\"", ["teacher.helper", "infer, rhp, oracle"]),
+        ("[expert]\nhelper = \"follow\"", ["expert.helper", "infer, rhp, oracle"]),
         ("[rollout]\nsplits = [\"test\"]", ["rollout.splits", "gen, gen-standard"]),
         ("[rollout]\nsplits = []", ["rollout.splits", "empty"]),
         ("[rollout]\npartners = [\"fast\"]", ["rollout.partners", "rules, farthest"]),
@@ -154,7 +154,7 @@ fn inputs_are_normalized_only_from_the_start() {
         n_candidates: 1,
         memory: Vec::new(),
     };
-    model.update_normalizer(&mut parameters, std::iter::once(&observation));
+    model.update_normalizer(&mut parameters, std::iter::once(&observation), 0);
     assert!(read(&config, &parameters).is_ok());
 }
 
@@ -325,11 +325,21 @@ fn policy_weights_include_the_opponent_model() {
         run_training::<PolicyTrainer<PpoTrainingConfig>>(&config, &folder, is_paused)
     });
     assert!(uninterrupted == resumed);
-    let weights = PolicyTrainer::<PpoTrainingConfig>::WEIGHTS;
-    let bytes = fs::read(folder.path().join("policy true").join(weights)).unwrap();
+    let file_name = PolicyTrainer::<PpoTrainingConfig>::WEIGHTS;
+    let bytes = fs::read(folder.path().join("policy true").join(file_name)).unwrap();
     let policy = PolicyWeights::from_bytes(&bytes).unwrap();
     assert_eq!(policy.kind.opponent, OpponentInput::Granted);
     assert_eq!(policy.opponent.unwrap().parameters(), parameters);
+    // A training from these weights has the model that it names, not that of the weights.
+    let other_file = folder.path().join("other.safetensors");
+    let network = opponent::network::network().network;
+    let other = network.init_parameters(8);
+    let kind = opponent::network::kind(true);
+    fs::write(&other_file, weights::to_bytes(&network, &other, kind).unwrap()).unwrap();
+    let rollout = RolloutConfig { opponent: Some(other_file), ..config.rollout.clone() };
+    let other_config = PpoTrainingConfig { rollout, ..config.clone() };
+    let initial = PolicyTrainer::<PpoTrainingConfig>::read_weights(&other_config, &bytes).unwrap();
+    assert!(initial.windows(other.len()).any(|window| window == other));
     // A missing file or one of another network is refused before anything is written.
     for (bytes, word) in [(&b"nothing"[..], "not a weights file"), (&bytes, "plan policy")] {
         fs::write(&file, bytes).unwrap();

@@ -4,6 +4,7 @@
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
+use chaic_agents::perception_factory::{GROUND_TRUTH, PerceptionFactory};
 use chaic_core::Frame;
 use chaic_files::{FileError, create_folders, read_bounded, write_atomically};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
@@ -41,7 +42,7 @@ pub enum StoreError {
     Config(PathBuf),
 }
 
-/// Folder of clips of one split and configuration.
+/// Folder of clips of one split, perception and configuration.
 #[derive(Clone, Debug)]
 pub struct ClipFolder(PathBuf);
 
@@ -49,24 +50,36 @@ impl ClipFolder {
     /// Opens a folder, or creates it.
     ///
     /// # Errors
-    /// If the folder has clips of another configuration, or a file cannot be read or written.
+    /// If the folder has clips of another configuration or perception, or a file cannot be read or written.
     pub fn open(
         folder: &Path,
         split: DatasetSplit,
         config: &ClipCollectionConfig,
+        perception: &dyn PerceptionFactory,
     ) -> Result<ClipFolder, StoreError> {
         create_folders(folder)?;
         let path = folder.join(CONFIG);
+        let perception = perception.name().unwrap_or_else(|| GROUND_TRUTH.to_owned());
         let text = format!(
-            "part = \"{split}\"\n{}",
+            "part = \"{split}\"\nperception = {}\n{}",
+            toml::Value::from(&*perception),
             toml::to_string(config).expect("the configuration has string keys only")
         );
         if !path.exists() {
             write_atomically(&path, text.as_bytes())?;
-        } else if parse_config(&read_bounded(&path, MAX_BYTES)?) != parse_config(text.as_bytes()) {
-            return Err(StoreError::Config(folder.to_owned()));
+            return Ok(ClipFolder(folder.to_owned()));
         }
-        Ok(ClipFolder(folder.to_owned()))
+        let found = parse_config(&read_bounded(&path, MAX_BYTES)?);
+        let is_same = found.is_some_and(|(found_split, found_perception, found_config)| {
+            found_split.as_str() == Some(&*split.to_string())
+                && found_config == *config
+                // Earlier versions did not write the perception.
+                && found_perception.is_none_or(|found| found.as_str() == Some(&*perception))
+        });
+        match is_same {
+            true => Ok(ClipFolder(folder.to_owned())),
+            false => Err(StoreError::Config(folder.to_owned())),
+        }
     }
 
     fn path(&self, first_episode: usize) -> PathBuf {
@@ -97,12 +110,12 @@ impl ClipFolder {
     }
 }
 
-/// Parses a configuration file into split and configuration; `None` if it is not one. Keys may be
-/// those of an earlier version.
-fn parse_config(text: &[u8]) -> Option<(toml::Value, ClipCollectionConfig)> {
+/// Parses a configuration file into split, perception and configuration; `None` if it is not one. Keys
+/// may be those of an earlier version.
+fn parse_config(text: &[u8]) -> Option<(toml::Value, Option<toml::Value>, ClipCollectionConfig)> {
     let mut table: toml::Table = std::str::from_utf8(text).ok()?.parse().ok()?;
-    let split = table.remove("part")?;
-    Some((split, table.try_into().ok()?))
+    let (split, perception) = (table.remove("part")?, table.remove("perception"));
+    Some((split, perception, table.try_into().ok()?))
 }
 
 /// Tensors of a file: name, type and shape per clip.
@@ -197,7 +210,10 @@ fn from_bytes(bytes: &[u8]) -> Result<Vec<Clip>, String> {
 mod tests {
     use std::fs;
 
+    use chaic_agents::perception_factory::GroundTruthPerceptionFactory;
+
     use super::*;
+    use crate::perception_registry::perception_from_name;
 
     fn clip(label: Behavior, first: Frame) -> Clip {
         let visible = |frame| PersonCrop {
@@ -217,7 +233,13 @@ mod tests {
     fn clips_are_read_as_they_were_written() {
         let dir = tempfile::tempdir().unwrap();
         let config = ClipCollectionConfig::default();
-        let folder = ClipFolder::open(dir.path(), DatasetSplit::Train, &config).unwrap();
+        let folder = ClipFolder::open(
+            dir.path(),
+            DatasetSplit::Train,
+            &config,
+            &GroundTruthPerceptionFactory,
+        )
+        .unwrap();
         let clips = vec![clip(Behavior::PutIn, 5), clip(Behavior::Moving, 90)];
         folder.write(16, &clips).unwrap();
         assert!(folder.read(16).unwrap() == Some(clips));
@@ -227,25 +249,67 @@ mod tests {
     }
 
     #[test]
+    fn clips_of_another_perception_are_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let config = ClipCollectionConfig::default();
+        let open = |perception: &dyn PerceptionFactory| {
+            ClipFolder::open(dir.path(), DatasetSplit::Train, &config, perception)
+        };
+        open(&GroundTruthPerceptionFactory).unwrap();
+        let noisy = perception_from_name("noisy", GROUND_TRUTH).unwrap();
+        assert!(matches!(open(&*noisy), Err(StoreError::Config(_))));
+        open(&GroundTruthPerceptionFactory).unwrap();
+    }
+
+    #[test]
     fn a_folder_of_an_earlier_version_is_opened() {
         let dir = tempfile::tempdir().unwrap();
         let text = "part = \"Training\"\nseed = 1\nof_each = 900\nepisodes = 1000\n\
                     varied = 0.35\nlearned = 0.0\n";
         fs::write(dir.path().join(CONFIG), text).unwrap();
         let config = ClipCollectionConfig::default();
-        ClipFolder::open(dir.path(), DatasetSplit::Train, &config).unwrap();
-        assert!(ClipFolder::open(dir.path(), DatasetSplit::Validation, &config).is_err());
+        ClipFolder::open(dir.path(), DatasetSplit::Train, &config, &GroundTruthPerceptionFactory)
+            .unwrap();
+        assert!(
+            ClipFolder::open(
+                dir.path(),
+                DatasetSplit::Validation,
+                &config,
+                &GroundTruthPerceptionFactory
+            )
+            .is_err()
+        );
     }
 
     #[test]
     fn other_configurations_and_damaged_files_are_refused() {
         let dir = tempfile::tempdir().unwrap();
         let config = ClipCollectionConfig::default();
-        let folder = ClipFolder::open(dir.path(), DatasetSplit::Train, &config).unwrap();
+        let folder = ClipFolder::open(
+            dir.path(),
+            DatasetSplit::Train,
+            &config,
+            &GroundTruthPerceptionFactory,
+        )
+        .unwrap();
         let other_config = ClipCollectionConfig { seed: 2, ..config };
-        let refused = ClipFolder::open(dir.path(), DatasetSplit::Train, &other_config).unwrap_err();
+        let refused = ClipFolder::open(
+            dir.path(),
+            DatasetSplit::Train,
+            &other_config,
+            &GroundTruthPerceptionFactory,
+        )
+        .unwrap_err();
         assert!(refused.to_string().contains("of another configuration"), "{refused}");
-        assert!(ClipFolder::open(dir.path(), DatasetSplit::Test, &config).is_err());
+        assert!(
+            ClipFolder::open(
+                dir.path(),
+                DatasetSplit::Test,
+                &config,
+                &GroundTruthPerceptionFactory
+            )
+            .is_err()
+        );
         let bytes = to_bytes(&[clip(Behavior::PutOn, 0)]);
         for length in [0, 7, 100, bytes.len() - 1] {
             fs::write(folder.path(0), &bytes[..length]).unwrap();

@@ -74,7 +74,9 @@ fn small_collection() -> ClipCollectionConfig {
 fn clips_are_contiguous_show_the_person_and_do_not_depend_on_threads() {
     let dir = tempfile::tempdir().unwrap();
     let config = small_collection();
-    let folder = ClipFolder::open(dir.path(), DatasetSplit::Train, &config).unwrap();
+    let folder =
+        ClipFolder::open(dir.path(), DatasetSplit::Train, &config, &GroundTruthPerceptionFactory)
+            .unwrap();
     let clips = |n_threads, folder| {
         let collector = Collector {
             split: DatasetSplit::Train,
@@ -90,7 +92,13 @@ fn clips_are_contiguous_show_the_person_and_do_not_depend_on_threads() {
     assert!(one == clips(2, Some(&folder)), "clips differ when they are read again");
     // A flag that is set during the first round leaves no files.
     let (other_dir, stop) = (tempfile::tempdir().unwrap(), AtomicBool::new(false));
-    let folder = ClipFolder::open(other_dir.path(), DatasetSplit::Train, &config).unwrap();
+    let folder = ClipFolder::open(
+        other_dir.path(),
+        DatasetSplit::Train,
+        &config,
+        &GroundTruthPerceptionFactory,
+    )
+    .unwrap();
     let collector = Collector {
         split: DatasetSplit::Train,
         config: &config,

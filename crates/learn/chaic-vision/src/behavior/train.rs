@@ -216,8 +216,9 @@ impl Trainer for BehaviorTrainer {
             };
             let config = ClipCollectionConfig { max_per_class, episodes, ..config.collect };
             let name = split.to_string().to_lowercase();
-            let folder = ClipFolder::open(&folder.join("clips").join(&name), split, &config)?;
-            let (perception, folder) = (&GroundTruthPerceptionFactory, Some(&folder));
+            let perception = &GroundTruthPerceptionFactory;
+            let path = folder.join("clips").join(&name);
+            let folder = Some(&ClipFolder::open(&path, split, &config, perception)?);
             let collector =
                 Collector { split, config: &config, perception, n_threads: THREADS, folder };
             let mut report_progress = |n: usize, counts: &Counts| {

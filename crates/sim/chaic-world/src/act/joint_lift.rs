@@ -100,15 +100,15 @@ impl World {
         let leader_steps = vec![
             self.raise_furniture(to),
             ActionStep::new(Phase::Grasp { hand: None, object }, d.grasp),
-            self.gap(),
+            self.pause(),
             self.reach(None, to),
-            self.gap(),
+            self.pause(),
             ActionStep::new(Phase::Face { to: object }, d.turn),
         ];
         let follower_steps = vec![
             ActionStep::new(Phase::CarryAlong, 0),
             self.reach(None, to),
-            self.gap(),
+            self.pause(),
             ActionStep::new(Phase::Face { to: object }, d.turn),
         ];
         self.state.joint = Some(JointCarry {
@@ -193,10 +193,10 @@ impl World {
     /// Ends a joint carry: the follower's pick-up succeeds.
     pub(super) fn end_joint_carry(&mut self) {
         let Some(joint) = self.state.joint.take() else { return };
-        let gap = self.gap();
+        let pause = self.pause();
         if let Some(activity) = self.person_mut(joint.follower).activity.as_mut() {
             activity.queue.clear();
-            activity.step = gap;
+            activity.step = pause;
         }
     }
 }

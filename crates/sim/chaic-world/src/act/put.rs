@@ -54,21 +54,21 @@ impl World {
         let to = self.front_in_world(agent);
         // The original attaches the dropped object to the container in one extra frame (facts
         // S2.2).
-        let attach_frames = d.gap;
+        let attach_frames = d.pause;
         vec![
             self.reset_arms(Some(hand), to),
-            self.gap(),
+            self.pause(),
             ActionStep::new(
                 Phase::Insert { object, container },
-                d.open_hand + d.gap + attach_frames,
+                d.open_hand + d.pause + attach_frames,
             ),
-            self.gap(),
+            self.pause(),
             self.reach(Some(hand), to + Vec3::Y * 0.15),
-            self.gap(),
+            self.pause(),
             self.reach(Some(hand.other()), to),
-            self.gap(),
-            ActionStep::new(Phase::Stand, d.move_away),
-            self.gap(),
+            self.pause(),
+            ActionStep::new(Phase::Stand, d.retract_arm),
+            self.pause(),
         ]
     }
 
@@ -78,7 +78,7 @@ impl World {
         if action != Action::PutIn {
             return 0;
         }
-        let max_frames = self.rules.durations.watch_put_in;
+        let max_frames = self.rules.durations.max_put_in_wait;
         self.rng(agent, RngPurpose::WatchPutIn).below(max_frames as usize + 1) as u32
     }
 
@@ -186,9 +186,9 @@ impl World {
         let release = Phase::Release { hand, object, on: Some(place), at, set_down: false };
         vec![
             self.reset_arms(hand, at),
-            ActionStep::new(release, d.open_hand + d.watch_fall),
+            ActionStep::new(release, d.open_hand + d.max_fall_wait),
             self.reach(hand, at),
-            self.gap(),
+            self.pause(),
             self.reach(hand, spot),
         ]
     }
@@ -221,7 +221,7 @@ impl World {
     fn basket_take_steps(&self, agent: AgentId) -> [ActionStep; 2] {
         let d = self.rules.durations;
         [
-            ActionStep::new(Phase::Stand, d.grasp + d.gap),
+            ActionStep::new(Phase::Stand, d.grasp + d.pause),
             self.reach(Some(Hand::Right), self.own_basket_in_world(agent)),
         ]
     }
@@ -242,9 +242,9 @@ impl World {
         let at = self.drop_spot(agent, object);
         let release = Phase::Release { hand, object, on: None, at, set_down: false };
         [
-            ActionStep::new(release, d.open_hand + d.watch_fall),
+            ActionStep::new(release, d.open_hand + d.max_fall_wait),
             self.reach(hand, at),
-            self.gap(),
+            self.pause(),
             ActionStep::new(Phase::Reach { hand, to, fails: true }, d.reach),
         ]
     }
@@ -270,7 +270,7 @@ impl World {
             self.reset_arms(Some(hand), at),
             ActionStep::new(release, d.open_hand),
             self.reach(Some(hand), at),
-            self.gap(),
+            self.pause(),
             self.reach(Some(hand), at + Vec3::Y * 0.5),
             ActionStep::new(Phase::Stand, d.turn),
         ];

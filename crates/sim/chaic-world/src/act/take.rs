@@ -122,13 +122,13 @@ impl World {
         }];
         if !fails || breaks {
             activity.queue.push(ActionStep::new(Phase::Grasp { hand, object }, d.grasp));
-        } else if d.vain_grasp > 0 {
-            activity.queue.push(ActionStep::new(Phase::Stand, d.vain_grasp));
+        } else if d.failed_grasp > 0 {
+            activity.queue.push(ActionStep::new(Phase::Stand, d.failed_grasp));
         }
         activity.queue.extend([
-            self.gap(),
+            self.pause(),
             ActionStep::new(Phase::Reach { hand, to, fails }, d.reach),
-            self.gap(),
+            self.pause(),
             ActionStep::new(Phase::Face { to: object }, d.turn),
         ]);
         StepProgress::Instant

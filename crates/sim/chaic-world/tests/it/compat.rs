@@ -34,26 +34,30 @@ fn compat_has_the_rules_of_the_original_and_no_other_differences() {
     let d = rules.durations;
     // Facts S9.4, S9.3, S2.2 and S1.4.
     assert_eq!(
-        [d.await_partner, d.raise_furniture, d.refused_pick, d.vain_grasp],
+        [d.await_partner, d.raise_furniture, d.refused_pick_up, d.failed_grasp],
         [3000, 17, 37, 0]
     );
     assert_eq!((rules.blocking, rules.reach_to), (Blocking::Creeps, ReachTo::Middle));
     assert_eq!((rules.joint_lift, rules.furniture_reach_limit_m), (JointLift::LastChoice, 3.0));
-    assert!(rules.tells_removed && rules.dropped_counts && rules.delivered_anywhere);
+    assert!(
+        rules.announces_removed_obstacles
+            && rules.failed_put_on_can_deliver
+            && rules.put_on_delivers_all_released
+    );
     assert!(!rules.containers_with_wheelchair && !rules.fragile_targets);
     assert_eq!([rules.break_chance_low, rules.break_chance_high], [0.0, 0.0]);
     rules.durations.await_partner = paper.durations.await_partner;
     rules.durations.raise_furniture = paper.durations.raise_furniture;
-    rules.durations.refused_pick = paper.durations.refused_pick;
-    rules.durations.vain_grasp = paper.durations.vain_grasp;
+    rules.durations.refused_pick_up = paper.durations.refused_pick_up;
+    rules.durations.failed_grasp = paper.durations.failed_grasp;
     let without = Rules {
         blocking: paper.blocking,
         reach_to: paper.reach_to,
         joint_lift: paper.joint_lift,
         furniture_reach_limit_m: paper.furniture_reach_limit_m,
-        tells_removed: paper.tells_removed,
-        dropped_counts: paper.dropped_counts,
-        delivered_anywhere: paper.delivered_anywhere,
+        announces_removed_obstacles: paper.announces_removed_obstacles,
+        failed_put_on_can_deliver: paper.failed_put_on_can_deliver,
+        put_on_delivers_all_released: paper.put_on_delivers_all_released,
         containers_with_wheelchair: paper.containers_with_wheelchair,
         fragile_targets: paper.fragile_targets,
         break_chance_low: paper.break_chance_low,
@@ -151,7 +155,7 @@ fn after_a_failed_put(rules: Rules) -> World {
 #[test]
 fn a_drop_near_the_goal_after_a_failed_put_counts_under_dropped_counts() {
     assert!(after_a_failed_put(PAPER).delivered().is_empty());
-    let w = after_a_failed_put(Rules { dropped_counts: true, ..PAPER });
+    let w = after_a_failed_put(Rules { failed_put_on_can_deliver: true, ..PAPER });
     assert_eq!(w.delivered(), vec![nth(0)]);
 }
 
@@ -166,14 +170,14 @@ fn a_put_on_anywhere_delivers_only_under_delivered_anywhere() {
         w.delivered()
     };
     assert!(delivered(PAPER).is_empty());
-    assert_eq!(delivered(Rules { delivered_anywhere: true, ..PAPER }), vec![nth(0)]);
+    assert_eq!(delivered(Rules { put_on_delivers_all_released: true, ..PAPER }), vec![nth(0)]);
     assert_eq!(delivered(Rules::compat()), vec![nth(0)]);
 }
 
 #[test]
 fn a_failed_put_on_delivers_with_a_successful_one_under_delivered_anywhere() {
     // Attempts with the left and the right hand, each at a table within or above the reach.
-    let delivered = |succeed: [bool; 2], delivered_anywhere| {
+    let delivered = |succeed: [bool; 2], put_on_delivers_all_released| {
         let tables = [(1.2, 0.0), (-1.2, 2.0)].map(|(x, bottom)| {
             let mut table = thing("dining_table", at(x, bottom, 0.0));
             table.fixed = true;
@@ -189,7 +193,7 @@ fn a_failed_put_on_delivers_with_a_successful_one_under_delivered_anywhere() {
         setup.goal.targets[0].1 = 3;
         let mut put_penalty = PAPER.put_penalty;
         put_penalty.alpha = 0.01;
-        let mut w = with(Rules { put_penalty, delivered_anywhere, ..PAPER }, setup);
+        let mut w = with(Rules { put_penalty, put_on_delivers_all_released, ..PAPER }, setup);
         for (hand, object) in [(Hand::Left, nth(0)), (Hand::Right, nth(1))] {
             assert_eq!(run(&mut w, A, Action::PickUp { object, hand }).0, Outcome::Success);
         }
@@ -303,7 +307,7 @@ fn refused_pick_and_raise_furniture_take_the_original_frames() {
     };
     let (ours, theirs) = (PAPER.durations, Rules::compat().durations);
     // A distant pick-up is refused at once, or after the return of both arms.
-    let refused = Durations { refused_pick: theirs.refused_pick, ..ours };
+    let refused = Durations { refused_pick_up: theirs.refused_pick_up, ..ours };
     assert_eq!([frames(ours, "apple", 6.0), frames(refused, "apple", 6.0)], [1, 37]);
     // Returning full arms takes 18 frames less.
     let raised = Durations { raise_furniture: theirs.raise_furniture, ..ours };
@@ -312,10 +316,10 @@ fn refused_pick_and_raise_furniture_take_the_original_frames() {
 
 #[test]
 fn removed_obstacles_are_announced_under_tells_removed() {
-    let announced = |tells_removed| {
+    let announced = |announces_removed_obstacles| {
         let bin = thing("trashbin", at(0.0, 0.0, -0.8));
         let setup = hall(vec![bin], vec![person(Persona::Helper, 0.0, 0.0)]);
-        let mut w = with(Rules { tells_removed, ..PAPER }, setup);
+        let mut w = with(Rules { announces_removed_obstacles, ..PAPER }, setup);
         assert!(w.announced_obstacles().is_empty());
         let remove = Action::RemoveObstacle { obstacle: nth(0), hand: Hand::Right };
         assert_eq!(run(&mut w, A, remove).0, Outcome::Success);

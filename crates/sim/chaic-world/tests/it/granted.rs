@@ -73,7 +73,7 @@ fn the_state_lists_movable_objects_and_possible_goal_places_with_their_true_exte
         assert!(object.position_in_world.distance(center) < 1e-4, "{object:?}");
         assert!((object.bottom_m - spec.position.y).abs() < 1e-4, "{object:?}");
         assert!((object.top_m - spec.position.y - size.y).abs() < 1e-4, "{object:?}");
-        assert_eq!((object.holder, object.container, object.is_out_of_play), (None, None, false));
+        assert_eq!((object.holder, object.container, object.is_gone), (None, None, false));
         let outline = &object.footprint;
         assert_eq!(outline.is_empty(), object.class.info().is_carriable());
         let next = outline.iter().cycle().skip(1);

@@ -204,7 +204,7 @@ mod tests {
         let mut memory = before_obstacle(Persona::Wheelchair, AgentId::PARTNER);
         let (start, mut navigator) = (memory.frame, LatticeNavigator::default());
         // The time limit is that of the plan.
-        for after in (0..memory.rules.limits.interact_frames).step_by(2) {
+        for after in (0..memory.rules.plan_timeouts.interact_frames).step_by(2) {
             memory.frame = start + after;
             let step = navigator.step(&mut memory, &beyond_obstacle());
             assert_eq!(step, NavigationStep::Act(Action::TurnLeft), "after {after} frames");

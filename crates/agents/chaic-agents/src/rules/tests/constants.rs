@@ -8,13 +8,13 @@ use chaic_core::{AgentId, Vec3};
 
 #[test]
 fn a_plan_is_reconsidered_after_the_time_in_the_rules() {
-    for reconsider_frames in [PAPER.time.reconsider_frames, 80] {
-        let time = TimeRules { reconsider_frames, ..PAPER.time };
+    for replan_interval_frames in [PAPER.time.replan_interval_frames, 80] {
+        let time = TimeRules { replan_interval_frames, ..PAPER.time };
         let mut s = Scenario::new(PlannerRules { time, ..PAPER });
         let mut partner = RulePolicy::new(RuleProfile::PARTNER);
         s.evaluate_with(&mut partner, |rules, context| rules.decide(context, &s.valid));
         let chosen = s.memory.frame;
-        let reconsidered = [reconsider_frames - 1, reconsider_frames].map(|after| {
+        let reconsidered = [replan_interval_frames - 1, replan_interval_frames].map(|after| {
             s.memory.frame = chosen + after;
             s.evaluate_with(&mut partner, |rules, c| rules.reconsiders(c, &Plan::Explore, false))
         });
@@ -26,7 +26,7 @@ fn a_plan_is_reconsidered_after_the_time_in_the_rules() {
 fn a_plan_ends_at_its_time_limit_and_its_object_is_ignored_for_a_while() {
     for (interact_frames, ignore_frames) in [(1000, 500), (200, 50)] {
         let rules = PlannerRules {
-            limits: PlanLimits { interact_frames, ..PAPER.limits },
+            plan_timeouts: PlanTimeouts { interact_frames, ..PAPER.plan_timeouts },
             failures: FailureRules { ignore_frames, ..PAPER.failures },
             ..PAPER
         };
@@ -49,7 +49,7 @@ fn a_plan_ends_at_its_time_limit_and_its_object_is_ignored_for_a_while() {
 fn impossible_or_held_objects_are_ignored_for_the_time_in_the_rules() {
     let failures = PAPER.failures;
     let shorter = FailureRules { impossible_frames: 100, ..failures };
-    let longer = FailureRules { held_for_sure_frames: 400, ..failures };
+    let longer = FailureRules { held_refusal_ignore_frames: 400, ..failures };
     for (failures, reason, from) in [
         (failures, FailureReason::Impossible, 2000),
         (shorter, FailureReason::Impossible, 100),
@@ -82,8 +82,10 @@ fn memory_with_people(rules: PlannerRules, partner_z: f32, child_z: f32) -> (Mem
 
 #[test]
 fn the_partner_is_at_a_piece_within_the_distance_in_the_rules() {
-    for (at_piece_m, expected) in [(PAPER.lifting.at_piece_m, true), (0.5, false)] {
-        let lifting = LiftingRules { at_piece_m, ..PAPER.lifting };
+    for (partner_at_furniture_m, expected) in
+        [(PAPER.lifting.partner_at_furniture_m, true), (0.5, false)]
+    {
+        let lifting = LiftingRules { partner_at_furniture_m, ..PAPER.lifting };
         // One meter from the near side of the piano.
         let (memory, briefing) = memory_with_people(PlannerRules { lifting, ..PAPER }, -1.7, -1.7);
         let plans = valid_plans(&memory, &briefing);

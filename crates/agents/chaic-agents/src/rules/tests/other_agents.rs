@@ -15,29 +15,29 @@ fn pose(x: f32, z: f32) -> Pose {
 
 #[test]
 fn an_object_in_a_persons_hands_is_unavailable_or_available() {
-    for sees_holding in [true, false] {
+    for sees_held_objects in [true, false] {
         let mut toy = Toy::room(8.0, 8.0);
         let apple = toy.add(ToyObject::new("apple", [0.0, 1.0, -2.5], [0.2, 0.2, 0.2]));
         toy.stand([0.0, 0.0], 0.0);
         let briefing = toy.briefing();
-        let mut memory = Memory::new(&briefing, PlannerRules { sees_holding, ..PAPER });
+        let mut memory = Memory::new(&briefing, PlannerRules { sees_held_objects, ..PAPER });
         let mut observation = toy.observe();
         observation.granted.poses = vec![(AgentId::PARTNER, pose(0.0, -2.9))];
         memory.update(&briefing, &observation, &GroundTruthIds.perceive(&observation));
         let object = memory.objects.get(apple).expect("seen");
-        assert_eq!(object.is_available(toy.frame), !sees_holding);
+        assert_eq!(object.is_available(toy.frame), !sees_held_objects);
     }
 }
 
 #[test]
 fn held_objects_are_granted_to_all_helpers_or_to_the_oracle_only() {
-    for knows_holding in [false, true] {
-        let rules = PlannerRules { knows_holding, ..PAPER };
-        assert_eq!(partner_grants(rules).behavior, knows_holding);
+    for knows_partner_behavior in [false, true] {
+        let rules = PlannerRules { knows_partner_behavior, ..PAPER };
+        assert_eq!(partner_grants(rules).behavior, knows_partner_behavior);
         let grants =
             |name: &str| (HelperInfo::find_helper(name).expect("it is built in").grants)(rules);
         for helper in ["random", "rhp", "follow"] {
-            assert_eq!(grants(helper).behavior, knows_holding, "{helper}");
+            assert_eq!(grants(helper).behavior, knows_partner_behavior, "{helper}");
         }
         assert!(grants("oracle").behavior);
     }
@@ -45,8 +45,10 @@ fn held_objects_are_granted_to_all_helpers_or_to_the_oracle_only() {
 
 #[test]
 fn objects_granted_as_held_are_avoided_for_the_time_in_the_rules() {
-    for held_frames in [PAPER.held_frames, PlannerRules::compat().held_frames] {
-        let rules = PlannerRules { held_frames, ..PAPER };
+    for seen_held_ignore_frames in
+        [PAPER.seen_held_ignore_frames, PlannerRules::compat().seen_held_ignore_frames]
+    {
+        let rules = PlannerRules { seen_held_ignore_frames, ..PAPER };
         let (mut memory, briefing, apple) = memory_of("apple", rules);
         let mut observation = Toy::room(8.0, 8.0).observe();
         observation.images = Default::default();
@@ -55,7 +57,7 @@ fn objects_granted_as_held_are_avoided_for_the_time_in_the_rules() {
             Some([Some(identity("apple", apple.0 as u16, &[])), None]);
         memory.update(&briefing, &observation, &GroundTruthIds.perceive(&observation));
         let object = memory.objects.get(apple).expect("seen");
-        let until = 10 + held_frames;
+        let until = 10 + seen_held_ignore_frames;
         assert!(!object.is_available(until - 1) && object.is_available(until));
     }
 }
@@ -133,9 +135,12 @@ fn a_child_unseen_for_long_is_searched_for() {
 
 #[test]
 fn a_child_beside_the_helper_is_trusted_to_come_back_or_not() {
-    for (trusts_child, expected) in [(true, Plan::Explore), (false, Plan::FollowChild)] {
-        let mut s =
-            child_scenario(PlannerRules { trusts_child, looks_around_first: false, ..PAPER });
+    for (leaves_returning_child, expected) in [(true, Plan::Explore), (false, Plan::FollowChild)] {
+        let mut s = child_scenario(PlannerRules {
+            leaves_returning_child,
+            initial_look_around: false,
+            ..PAPER
+        });
         let mut rhp = RulePolicy::new(RuleProfile::RHP);
         let chosen = [100, 140].map(|frame| {
             observe_both(&mut s, frame);
@@ -147,22 +152,22 @@ fn a_child_beside_the_helper_is_trusted_to_come_back_or_not() {
 
 #[test]
 fn the_helper_stays_with_the_child_briefly_or_as_long_as_it_is_there() {
-    for trusts_child in [true, false] {
-        let mut s = child_scenario(PlannerRules { trusts_child, ..PAPER });
+    for leaves_returning_child in [true, false] {
+        let mut s = child_scenario(PlannerRules { leaves_returning_child, ..PAPER });
         let mut executor = Executor::new(&s.briefing, &s.memory.rules);
         observe_both(&mut s, 100);
         let first = s.start_plan(&mut executor, Plan::FollowChild);
         assert!(matches!(first, Progress::Act(_)), "{first:?}");
         observe_both(&mut s, 140);
         let then = s.continue_plan(&mut executor, Plan::FollowChild);
-        assert_eq!(then == Progress::Done, trusts_child, "{then:?}");
-        assert_eq!(matches!(then, Progress::Act(_)), !trusts_child, "{then:?}");
+        assert_eq!(then == Progress::Done, leaves_returning_child, "{then:?}");
+        assert_eq!(matches!(then, Progress::Act(_)), !leaves_returning_child, "{then:?}");
     }
 }
 
 #[test]
 fn without_trust_the_helper_leaves_the_child_some_time_after_it_was_last_away() {
-    let mut s = child_scenario(PlannerRules { trusts_child: false, ..PAPER });
+    let mut s = child_scenario(PlannerRules { leaves_returning_child: false, ..PAPER });
     let mut executor = Executor::new(&s.briefing, &s.memory.rules);
     let mut at = |frame, apart_m| {
         observe_apart(&mut s, frame, apart_m);
@@ -180,8 +185,8 @@ fn without_trust_the_helper_leaves_the_child_some_time_after_it_was_last_away() 
 
 #[test]
 fn looking_around_ends_when_both_are_found_or_continues() {
-    for (stops_turning_when_found, n) in [(false, PAPER.around_turns), (true, 0)] {
-        let mut s = child_scenario(PlannerRules { stops_turning_when_found, ..PAPER });
+    for (look_around_stops_when_found, n) in [(false, PAPER.look_around_turns), (true, 0)] {
+        let mut s = child_scenario(PlannerRules { look_around_stops_when_found, ..PAPER });
         observe_both(&mut s, 100);
         assert_eq!(s.n_turns_around(), n);
     }
@@ -189,9 +194,9 @@ fn looking_around_ends_when_both_are_found_or_continues() {
 
 #[test]
 fn only_helpers_that_care_for_the_child_follow_it_when_it_is_away() {
-    for (minds_child, expected) in [(true, Plan::FollowChild), (false, Plan::Explore)] {
+    for (supervises_child, expected) in [(true, Plan::FollowChild), (false, Plan::Explore)] {
         let mut s =
-            child_scenario(PlannerRules { minds_child, looks_around_first: false, ..PAPER });
+            child_scenario(PlannerRules { supervises_child, initial_look_around: false, ..PAPER });
         observe_both(&mut s, 100);
         assert_eq!(s.choose_as(RuleProfile::RHP), expected);
         // The partner's rules ignore the child in any case.

@@ -67,7 +67,7 @@ pub(super) const EXAMPLES: &[CommandExamples] = &[
         [
             ("List the rules", "chaic list rules"),
             ("List them as JSON", "chaic list rules --format json"),
-            ("Change one rule", "chaic eval --set world.dropped_counts=true"),
+            ("Change one rule", "chaic eval --set world.failed_put_on_can_deliver=true"),
         ],
     ),
     (

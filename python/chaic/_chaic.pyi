@@ -168,8 +168,7 @@ class World:
         """Returns the reward terms of the last action of an agent: `delivered`, `progress_m`, `is_invalid`; `None` before
         the first one."""
     def score(self) -> dict[str, Any]:
-        """Returns the score so far: `frame`, `delivered`, `wanted`, `complete`; TR is
-        `delivered / wanted`."""
+        """Returns the score so far: `frame`, `delivered`, `wanted`, `complete`; TR is `delivered / wanted`."""
     def take_events(self) -> list[dict[str, Any]]:
         """Returns the events since the last call (docs/reference/trace.md)."""
     def digest(self) -> str:

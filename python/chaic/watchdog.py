@@ -77,7 +77,9 @@ class Watchdog:
         except _TimeLimitExceeded:
             is_expired = self._end(thread)
         if is_expired:
-            raise TimeoutError(f"{call} took longer than {self._limit_s:g} s") from error
+            problem = TimeoutError(f"{call} took longer than {self._limit_s:g} s")
+            # The traceback shows where the call was.
+            raise problem.with_traceback(None if error is None else error.__traceback__) from None
         if error is not None:
             raise error
 

@@ -19,7 +19,7 @@ pub fn check(settings: &Settings) -> Result<String> {
     let message = Message { role: Role::User, text: text.to_owned(), images: Vec::new() };
     let mut summary = String::new();
     for (n_schema_plans, form) in [(Some(2), "by JSON schema"), (None, "as text")] {
-        let (model, messages) = (settings.asking.model.clone(), vec![message.clone()]);
+        let (model, messages) = (settings.request.model.clone(), vec![message.clone()]);
         let request = ChatRequest { model, purpose: Purpose::Decide, messages, n_schema_plans };
         match client.send(&request, &ImagesByHash::new(), &|| false) {
             Ok(Reply::Answer { text, usage, latency_ms, .. }) => {

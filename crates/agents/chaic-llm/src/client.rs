@@ -11,7 +11,7 @@ use crate::exchange::{ChatRequest, DecisionRecord, Exchange, Fault, FaultKind, R
 use crate::rate_limiter::{self, Admission, RateLimiter, Spent};
 use crate::record::{self, DecisionLog, DecisionLogWriter, RecordEntry, RecordHeader};
 use crate::session::{Session, Source};
-use crate::settings::FaultAction;
+use crate::settings::FailureAction;
 
 /// Requests of one agent in one episode run, with its record.
 pub struct LlmClient<'a> {
@@ -47,7 +47,7 @@ impl Conversation {
                 Err(error) => session.halt(format!("nothing to replay: {error}")),
             }
         }
-        let head = RecordHeader::new(key, agent, &session.settings.asking.model);
+        let head = RecordHeader::new(key, agent, &session.settings.request.model);
         match DecisionLogWriter::open(run, &record::path(run, key, agent), &head) {
             Ok(recorder) => conversation.recorder = Some(recorder),
             Err(error) => session.halt(error.to_string()),
@@ -158,7 +158,7 @@ impl<'a> LlmClient<'a> {
             if fault.kind == FaultKind::Schema {
                 return Ok(Exchange::new(frame, request, faults, Reply::Failed(fault)));
             }
-            let is_last_attempt = !is_retryable || attempts >= settings.faults.attempts;
+            let is_last_attempt = !is_retryable || attempts >= settings.retry.max_attempts;
             if is_last_attempt {
                 self.pause_if_exhausted(&fault, attempts)?;
             }
@@ -202,9 +202,9 @@ impl<'a> LlmClient<'a> {
         attempts: u32,
         retry_after: Option<Duration>,
     ) -> Duration {
-        let faults = &self.session.settings.faults;
-        let max = Duration::from_secs_f32(faults.longest_wait_secs);
-        let initial = Duration::from_secs_f32(faults.first_wait_secs);
+        let retry = &self.session.settings.retry;
+        let max = Duration::from_secs_f32(retry.max_backoff_secs);
+        let initial = Duration::from_secs_f32(retry.initial_backoff_secs);
         let doubled = initial.saturating_mul(1 << (attempts - 1).min(20)).min(max);
         let jitter = request.hash().to_string();
         let jitter = u32::from_str_radix(&jitter[..4], 16).unwrap_or(0) as f32 / 65536.0;
@@ -214,7 +214,7 @@ impl<'a> LlmClient<'a> {
 
     fn budget_fault(&self, limit: &str) -> Result<Fault, Halted> {
         let detail = format!("the budget of {limit} is spent");
-        if self.session.settings.budget.then == FaultAction::Pause {
+        if self.session.settings.budget.on_exhausted == FailureAction::Pause {
             self.session.halt(format!("{detail}; resume with a larger one"));
             return Err(Halted);
         }
@@ -222,7 +222,7 @@ impl<'a> LlmClient<'a> {
     }
 
     fn pause_if_exhausted(&self, fault: &Fault, attempts: u32) -> Result<(), Halted> {
-        if self.session.settings.faults.then == FaultAction::Pause {
+        if self.session.settings.retry.on_failure == FailureAction::Pause {
             let times = if attempts == 1 { "once" } else { &format!("{attempts} times") };
             self.session.halt(format!("the model cannot be reached (tried {times}): {fault}"));
             return Err(Halted);

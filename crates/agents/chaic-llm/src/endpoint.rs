@@ -57,7 +57,7 @@ pub struct Client {
     wire: Arc<Wire>,
     kind: EndpointKind,
     key: Key,
-    asking: PromptSettings,
+    settings: PromptSettings,
 }
 
 impl Client {
@@ -73,7 +73,7 @@ impl Client {
     /// Creates a client with a known key.
     pub fn with_key(settings: &Settings, key: Key) -> Client {
         let wire = Arc::new(Wire::new(settings, key.clone()));
-        Client { wire, kind: settings.endpoint.kind, key, asking: settings.asking.clone() }
+        Client { wire, kind: settings.endpoint.kind, key, settings: settings.request.clone() }
     }
 
     /// Returns the maximum usage of a request, for the budget.
@@ -81,7 +81,7 @@ impl Client {
         let text: usize = request.messages.iter().map(|m| tokens::estimate(&m.text)).sum();
         let images: usize = request.messages.iter().map(|m| m.images.len()).sum();
         let prompt = text as u64 + images as u64 * IMAGE_TOKENS;
-        Usage { prompt, answer: u64::from(self.asking.answer_tokens), estimated: true }
+        Usage { prompt, answer: u64::from(self.settings.max_answer_tokens), estimated: true }
     }
 
     /// Sends a request once. `is_abandoned` is polled during the wait; after it returns true, an
@@ -115,13 +115,14 @@ impl Client {
         let messages: Vec<Value> =
             request.messages.iter().map(|m| self.message(m, images_by_hash)).collect();
         body.insert("messages".to_owned(), Value::Array(messages));
-        let PromptSettings { temperature, top_p, seed, answer_tokens, answer_tokens_field, .. } =
-            &self.asking;
+        let PromptSettings {
+            temperature, top_p, seed, max_answer_tokens, max_tokens_field, ..
+        } = &self.settings;
         let optional = [
             ("temperature", temperature.map(|x| json!(x))),
             ("top_p", top_p.map(|x| json!(x))),
             ("seed", seed.map(|s| json!(s))),
-            (answer_tokens_field.as_str(), Some(json!(answer_tokens))),
+            (max_tokens_field.as_str(), Some(json!(max_answer_tokens))),
             ("response_format", request.n_schema_plans.map(schema)),
         ];
         for (name, value) in optional {
@@ -129,8 +130,8 @@ impl Client {
                 body.insert(name.to_owned(), value);
             }
         }
-        body.retain(|name, _| !self.asking.omit.contains(name));
-        body.extend(self.asking.extra.clone());
+        body.retain(|name, _| !self.settings.omit_fields.contains(name));
+        body.extend(self.settings.extra.clone());
         Value::Object(body)
     }
 
@@ -142,7 +143,7 @@ impl Client {
         if message.images.is_empty() {
             return json!({ "role": role, "content": message.text });
         }
-        let kind = match self.asking.images.format {
+        let kind = match self.settings.images.format {
             ImageEncoding::Png => "image/png",
             ImageEncoding::Jpeg => "image/jpeg",
         };
@@ -314,7 +315,7 @@ mod tests {
     pub(super) fn settings(url: &str, kind: EndpointKind) -> Settings {
         let mut settings = Settings::default();
         (settings.endpoint.url, settings.endpoint.kind) = (url.to_owned(), kind);
-        settings.asking.model = "m".to_owned();
+        settings.request.model = "m".to_owned();
         settings
     }
 
@@ -333,9 +334,9 @@ mod tests {
     #[test]
     fn a_request_has_the_fields_of_the_settings() {
         let mut settings = settings("http://h/v1", EndpointKind::Openai);
-        settings.asking.answer_tokens_field = "max_completion_tokens".to_owned();
-        settings.asking.extra.insert("think".to_owned(), json!(false));
-        settings.asking.omit = vec!["top_p".to_owned()];
+        settings.request.max_tokens_field = "max_completion_tokens".to_owned();
+        settings.request.extra.insert("think".to_owned(), json!(false));
+        settings.request.omit_fields = vec!["top_p".to_owned()];
         let client = Client::with_key(&settings, Key::new(""));
         let image = ContentHash::new(b"x");
         let message = crate::exchange::Message {

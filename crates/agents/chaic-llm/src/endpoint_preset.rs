@@ -26,7 +26,7 @@ impl EndpointPreset {
             settings.endpoint.url.clone_from(url);
         }
         if let Some(model) = &self.model {
-            settings.asking.model.clone_from(model);
+            settings.request.model.clone_from(model);
         }
         if self.key_env.is_some() {
             settings.endpoint.key_env.clone_from(&self.key_env);
@@ -72,7 +72,7 @@ mod tests {
 
     fn recorded(url: &str, key_env: Option<&str>) -> Settings {
         let mut settings = Settings::default();
-        settings.asking.model = "m".to_owned();
+        settings.request.model = "m".to_owned();
         settings.endpoint.url = url.to_owned();
         settings.endpoint.key_env = key_env.map(str::to_owned);
         settings.endpoint.allow_http = true;

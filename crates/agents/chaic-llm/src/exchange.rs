@@ -210,7 +210,7 @@ pub struct Exchange {
     /// Request.
     #[serde(rename = "ask")]
     pub request: ChatRequest,
-    /// Faults of the attempts, in order.
+    /// Failures of the attempts, in order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<Fault>,
     /// Digest of the reply.

@@ -159,7 +159,7 @@ impl LanguageHelpers {
     fn helper(&self, name: &str, key: Option<&RunKey>, rules: PlannerRules) -> Option<Helper> {
         let kind = HELPERS.into_iter().find(|k| k.name == name)?;
         let knows_task = kind.track == PromptTrack::KnownTask;
-        let is_granted = self.session.settings.asking.behavior == BehaviorSource::Granted;
+        let is_granted = self.session.settings.request.behavior == BehaviorSource::Granted;
         let behavior = knows_task || is_granted || rules.knows_partner_behavior;
         let grants = Grants { behavior, task: knows_task, ..Grants::PLANNER };
         let grants = self.perception.grants(grants);
@@ -216,7 +216,7 @@ impl HelperRegistry for LanguageHelpers {
     }
 
     fn waiting_jobs(&self) -> usize {
-        if self.is_live() { self.session.settings.endpoint.in_flight } else { 0 }
+        if self.is_live() { self.session.settings.endpoint.max_concurrent_requests } else { 0 }
     }
 
     fn is_slow(&self, name: &str) -> bool {

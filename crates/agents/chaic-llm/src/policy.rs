@@ -95,8 +95,8 @@ impl LanguagePolicy {
         }
     }
 
-    fn asking(&self) -> &PromptSettings {
-        &self.session.settings.asking
+    fn settings(&self) -> &PromptSettings {
+        &self.session.settings.request
     }
 
     fn count(&mut self, name: &str, n: u64) {
@@ -130,7 +130,7 @@ impl LanguagePolicy {
         let seconds = latency_ms as f32 / 1000.0;
         let left = context.briefing.horizon.saturating_sub(frame);
         self.thinking_frames =
-            ((seconds * self.asking().frames_per_second).ceil() as Frame).min(left);
+            ((seconds * self.settings().frames_per_second).ceil() as Frame).min(left);
         match outcome {
             Outcome::Chosen { index, lenient } => {
                 let plan = prompt.plans[index];
@@ -162,7 +162,7 @@ impl LanguagePolicy {
     ) -> Result<(Prompt, Outcome), Halted> {
         let frame = context.memory.frame;
         let (hashes, images) = match self.has_images {
-            true => self.recent_images.encoded(self.asking().images),
+            true => self.recent_images.encoded(self.settings().images),
             false => Default::default(),
         };
         let mut prompt = self.prompt(context, listed)?;
@@ -172,7 +172,7 @@ impl LanguagePolicy {
             |text: &str| vec![Message { images: hashes.clone(), ..message(Role::User, text) }];
         let mut messages = first(&prompt.text);
         let mut purpose = Purpose::Decide;
-        if self.asking().steps == PromptSteps::Two {
+        if self.settings().steps == PromptSteps::Two {
             let exchange = self.exchange(frame, Purpose::Think, &messages, None, &images)?;
             let Reply::Answer { text, latency_ms: ms, .. } = exchange.reply else {
                 return Ok((prompt, Outcome::Failed(failure_source(&exchange))));
@@ -229,7 +229,7 @@ impl LanguagePolicy {
         n_schema_plans: Option<usize>,
         images: &ImagesByHash,
     ) -> Result<Exchange, Halted> {
-        let model = self.asking().model.clone();
+        let model = self.settings().model.clone();
         let request = ChatRequest { model, purpose, messages: messages.to_vec(), n_schema_plans };
         let exchange = LlmClient::new(&self.session, &mut self.conversation)
             .request(frame, request, images)?;
@@ -254,8 +254,8 @@ impl LanguagePolicy {
 
     /// Switches to text answers after the endpoint refused a JSON schema, if the settings allow.
     fn disable_schema(&mut self, detail: &str) -> Result<(), Halted> {
-        if self.asking().form == AnswerForm::Schema {
-            let hint = "set asking.form to \"auto\" or \"text\"";
+        if self.settings().answer_format == AnswerForm::Schema {
+            let hint = "set request.answer_format to \"auto\" or \"text\"";
             self.session.halt(format!("the endpoint refuses a JSON schema ({detail}); {hint}"));
             return Err(Halted);
         }
@@ -265,8 +265,8 @@ impl LanguagePolicy {
 
     /// Returns the longest prompt within the settings' limit.
     fn prompt(&self, context: &Context<'_>, listed: &[Plan]) -> Result<Prompt, Halted> {
-        let asking = self.asking();
-        let question = match (asking.steps, self.by_schema) {
+        let settings = self.settings();
+        let question = match (settings.steps, self.by_schema) {
             (PromptSteps::Two, _) => Question::Think,
             (PromptSteps::One, true) => Question::Schema,
             (PromptSteps::One, false) => Question::Text,
@@ -278,12 +278,12 @@ impl LanguagePolicy {
                 PromptContext::new(self.track, context, listed, self.last_plan, images, length);
             let text = self.or_halt(self.session.templates.prompt(&facts, question))?;
             let mut tokens = tokens::estimate(&text) + REPETITION_TOKENS;
-            if asking.steps == PromptSteps::Two {
+            if settings.steps == PromptSteps::Two {
                 let choose = self.or_halt(self.session.templates.choose(&facts))?;
-                tokens += asking.answer_tokens as usize + tokens::estimate(&choose);
+                tokens += settings.max_answer_tokens as usize + tokens::estimate(&choose);
             }
             let texts = facts.plans.iter().map(|p| p.text.clone()).collect();
-            let fits = tokens <= asking.prompt_tokens as usize;
+            let fits = tokens <= settings.max_prompt_tokens as usize;
             shortest = Some(Prompt { facts, plans, texts, text, tokens, shortened });
             if fits {
                 break;
@@ -302,7 +302,7 @@ impl LanguagePolicy {
     /// Chooses a plan without the model.
     fn fall_back(&mut self, context: &Context<'_>, listed: &[Plan]) -> Plan {
         let first_of = |plans: &[Plan]| plans.iter().copied().find(|p| listed.contains(p));
-        let chosen = match self.asking().fallback {
+        let chosen = match self.settings().fallback {
             Fallback::Wait => Some(Plan::Wait),
             Fallback::Explore => None,
             Fallback::Rules => Some(self.rules.decide(context, listed)),
@@ -325,7 +325,8 @@ impl LanguagePolicy {
     ) -> Result<(), Halted> {
         self.used_fallback = !matches!(source, DecisionSource::Model | DecisionSource::OnlyPlan);
         let shortened = prompt.map_or(0, |p| p.shortened);
-        let is_too_long = prompt.is_some_and(|p| p.tokens > self.asking().prompt_tokens as usize);
+        let is_too_long =
+            prompt.is_some_and(|p| p.tokens > self.settings().max_prompt_tokens as usize);
         for (name, n) in [
             ("decisions", 1),
             ("decided_by_model", u64::from(source == DecisionSource::Model)),
@@ -374,8 +375,8 @@ impl Policy for LanguagePolicy {
             Some(key) => Conversation::open(&self.session, key, briefing.me),
             None => Conversation::default(),
         };
-        self.by_schema =
-            self.asking().form != AnswerForm::Text && self.asking().steps == PromptSteps::One;
+        self.by_schema = self.settings().answer_format != AnswerForm::Text
+            && self.settings().steps == PromptSteps::One;
         self.recent_images.clear();
         (self.last_plan, self.tried) = (None, (0, Vec::new()));
         (self.wait_until, self.thinking_frames, self.used_fallback) = (0, 0, false);
@@ -396,14 +397,14 @@ impl Policy for LanguagePolicy {
         self.tried.1.push(plan);
         self.last_plan = Some(plan);
         if plan == Plan::Wait {
-            self.wait_until = now + self.thinking_frames + self.asking().wait_frames;
+            self.wait_until = now + self.thinking_frames + self.settings().wait_frames;
         }
         Ok(plan)
     }
 
     fn observe(&mut self, observation: &Observation, _: &Memory, _: &BehaviorLog) {
         if self.has_images {
-            self.recent_images.push(observation, self.session.settings.asking.images);
+            self.recent_images.push(observation, self.session.settings.request.images);
         }
     }
 

@@ -18,27 +18,27 @@ pub struct Spent {
     /// Tokens of prompts and answers.
     pub tokens: u64,
     /// Money.
-    pub money: f64,
+    pub cost: f64,
 }
 
 impl Spent {
     /// Returns the cost of requests with this usage.
     pub fn new(requests: u64, usage: Usage, price: &Price) -> Spent {
-        let money = price.millionths(usage) / 1e6;
-        Spent { requests, tokens: usage.prompt + usage.answer, money }
+        let cost = price.millionths(usage) / 1e6;
+        Spent { requests, tokens: usage.prompt + usage.answer, cost }
     }
 
     /// Adds another amount.
     pub fn add(&mut self, other: Spent) {
         self.requests += other.requests;
         self.tokens += other.tokens;
-        self.money += other.money;
+        self.cost += other.cost;
     }
 
     fn subtract(&mut self, other: Spent) {
         self.requests -= other.requests;
         self.tokens -= other.tokens;
-        self.money -= other.money;
+        self.cost -= other.cost;
     }
 }
 
@@ -121,23 +121,23 @@ impl RateLimiter {
     }
 
     fn spent_limit(&self, spent: Spent) -> Option<&'static str> {
-        let Budget { requests, tokens, money, minutes, .. } = self.budget;
+        let Budget { max_requests, max_tokens, max_cost, max_minutes, .. } = self.budget;
         let minutes_passed = self.start.elapsed().as_secs_f64() / 60.0;
         [
-            (requests.is_some_and(|n| spent.requests >= n), "requests"),
-            (tokens.is_some_and(|n| spent.tokens >= n), "tokens"),
-            (money.is_some_and(|n| spent.money >= n), "money"),
-            (minutes.is_some_and(|n| minutes_passed >= n), "minutes"),
+            (max_requests.is_some_and(|n| spent.requests >= n), "requests"),
+            (max_tokens.is_some_and(|n| spent.tokens >= n), "tokens"),
+            (max_cost.is_some_and(|n| spent.cost >= n), "cost"),
+            (max_minutes.is_some_and(|n| minutes_passed >= n), "minutes"),
         ]
         .into_iter()
         .find_map(|(is_spent, limit)| is_spent.then_some(limit))
     }
 
     fn exceeds(&self, total: Spent) -> bool {
-        let Budget { requests, tokens, money, .. } = self.budget;
-        requests.is_some_and(|n| total.requests > n)
-            || tokens.is_some_and(|n| total.tokens > n)
-            || money.is_some_and(|n| total.money > n)
+        let Budget { max_requests, max_tokens, max_cost, .. } = self.budget;
+        max_requests.is_some_and(|n| total.requests > n)
+            || max_tokens.is_some_and(|n| total.tokens > n)
+            || max_cost.is_some_and(|n| total.cost > n)
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
@@ -167,15 +167,15 @@ mod tests {
     static NOT_STOPPED: AtomicBool = AtomicBool::new(false);
 
     fn cost(tokens: u64) -> Spent {
-        Spent { requests: 1, tokens, money: tokens as f64 / 1000.0 }
+        Spent { requests: 1, tokens, cost: tokens as f64 / 1000.0 }
     }
 
     #[test]
     fn the_budget_is_exceeded_by_one_request_at_most() {
         let budgets = [
-            Budget { requests: Some(7), ..Budget::default() },
-            Budget { tokens: Some(1000), ..Budget::default() },
-            Budget { money: Some(1.0), ..Budget::default() },
+            Budget { max_requests: Some(7), ..Budget::default() },
+            Budget { max_tokens: Some(1000), ..Budget::default() },
+            Budget { max_cost: Some(1.0), ..Budget::default() },
         ];
         for budget in budgets {
             let limiter = RateLimiter::new(budget, 16, Spent::default());
@@ -215,13 +215,13 @@ mod tests {
 
     #[test]
     fn earlier_spending_and_elapsed_time_count() {
-        let budget = Budget { requests: Some(3), ..Budget::default() };
+        let budget = Budget { max_requests: Some(3), ..Budget::default() };
         let before = Spent { requests: 3, ..Spent::default() };
         assert_eq!(
             RateLimiter::new(budget, 1, before).enter(cost(1), &NOT_STOPPED),
             Admission::BudgetSpent("requests")
         );
-        let budget = Budget { minutes: Some(0.0), ..Budget::default() };
+        let budget = Budget { max_minutes: Some(0.0), ..Budget::default() };
         let limiter = RateLimiter::new(budget, 1, Spent::default());
         assert_eq!(limiter.enter(cost(1), &NOT_STOPPED), Admission::BudgetSpent("minutes"));
     }

@@ -15,7 +15,7 @@ use crate::error::{LlmError, Result};
 use crate::exchange::{ContentHash, Fault};
 use crate::rate_limiter::{RateLimiter, Spent};
 use crate::record::{self, DecisionLog, RecordEntry};
-use crate::settings::{Budget, Endpoint, Faults, Price, PromptSettings, Settings};
+use crate::settings::{Budget, Endpoint, Price, PromptSettings, RetrySettings, Settings};
 use crate::templates::Templates;
 
 /// Source of answers.
@@ -66,13 +66,15 @@ struct Recorded {
     version: u32,
     chaic: String,
     /// Settings that affect results. The templates are beside this file.
-    asking: PromptSettings,
+    #[serde(alias = "asking")]
+    request: PromptSettings,
     /// Digest of all templates.
     templates: ContentHash,
     /// Endpoint, for information only; it may change on resume. Absent for a replay.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     endpoint: Option<Endpoint>,
-    faults: Faults,
+    #[serde(alias = "faults")]
+    retry: RetrySettings,
     budget: Budget,
     price: Price,
 }
@@ -84,7 +86,7 @@ impl Session {
     /// If settings are out of bounds, or a template is invalid.
     pub fn new(settings: Settings, source: Source, stop: &'static AtomicBool) -> Result<Session> {
         settings.check_bounds()?;
-        let templates = Templates::load(settings.asking.templates.as_deref())?;
+        let templates = Templates::load(settings.request.templates.as_deref())?;
         let (problem, listener, run) = (Mutex::new(None), OnceLock::new(), OnceLock::new());
         let failures = AtomicU32::new(NOTIFY_AFTER - 1);
         Ok(Session { settings, templates, source, stop, problem, listener, failures, run })
@@ -113,8 +115,11 @@ impl Session {
             }
         }
         let earlier = spent_before(run, &self.settings.price)?;
-        let limiter =
-            RateLimiter::new(self.settings.budget, self.settings.endpoint.in_flight, earlier);
+        let limiter = RateLimiter::new(
+            self.settings.budget,
+            self.settings.endpoint.max_concurrent_requests,
+            earlier,
+        );
         // A second call keeps the first folder.
         let _ = self.run.set((run.to_owned(), limiter));
         Ok(())
@@ -127,10 +132,10 @@ impl Session {
             format: FORMAT.to_owned(),
             version: VERSION,
             chaic: CHAIC_VERSION.to_owned(),
-            asking: PromptSettings { templates: None, ..self.settings.asking.clone() },
+            request: PromptSettings { templates: None, ..self.settings.request.clone() },
             templates: self.templates.hash(),
             endpoint,
-            faults: self.settings.faults,
+            retry: self.settings.retry,
             budget: self.settings.budget,
             price: self.settings.price.clone(),
         }
@@ -161,7 +166,7 @@ impl Session {
     pub fn record_failure(&self, fault: &Fault) {
         let n = self.failures.fetch_add(1, Ordering::Relaxed).saturating_add(1);
         if let (NOTIFY_AFTER, Some(listener)) = (n, self.listener.get()) {
-            let attempts = self.settings.faults.attempts;
+            let attempts = self.settings.retry.max_attempts;
             listener(&format!(
                 "the model cannot be reached at the moment: {fault}; each request is tried up to \
                  {attempts} times"
@@ -204,9 +209,9 @@ pub fn settings_of(run: &Path) -> Result<Option<Settings>> {
         return Err(LlmError::io("read", &templates)(std::io::Error::other(problem)));
     }
     Ok(Some(Settings {
-        asking: PromptSettings { templates: Some(templates), ..recorded.asking },
+        request: PromptSettings { templates: Some(templates), ..recorded.request },
         endpoint: recorded.endpoint.unwrap_or_default(),
-        faults: recorded.faults,
+        retry: recorded.retry,
         budget: recorded.budget,
         price: recorded.price,
     }))
@@ -233,12 +238,12 @@ fn compare(run: &Path, recorded: &Recorded, current: &Recorded) -> Result<()> {
         let (path, field) = (run.to_owned(), field.to_owned());
         Err(LlmError::SettingDiffers { path, field, recorded, given })
     };
-    let value = |r: &Recorded| serde_json::to_value(&r.asking).expect("settings have string keys");
+    let value = |r: &Recorded| serde_json::to_value(&r.request).expect("settings have string keys");
     let (recorded_value, current_value) = (value(recorded), value(current));
     for (name, old) in recorded_value.as_object().into_iter().flatten() {
         let given = &current_value[name];
         if old != given {
-            let field = format!("asking.{name}");
+            let field = format!("request.{name}");
             return differs(&field, old.to_string(), given.to_string());
         }
     }
@@ -270,7 +275,7 @@ mod tests {
 
     fn session() -> Session {
         let mut settings = Settings::default();
-        settings.asking.model = "m".to_owned();
+        settings.request.model = "m".to_owned();
         let stop = Box::leak(Box::new(AtomicBool::new(false)));
         Session::new(settings, Source::Offline, stop).unwrap()
     }

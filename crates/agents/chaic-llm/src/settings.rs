@@ -19,11 +19,13 @@ const MAX_CONFIG_BYTES: usize = 1 << 20;
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
     /// Requests and the use of answers.
-    pub asking: PromptSettings,
+    #[serde(alias = "asking")]
+    pub request: PromptSettings,
     /// Endpoint.
     pub endpoint: Endpoint,
     /// Handling of failures.
-    pub faults: Faults,
+    #[serde(alias = "faults")]
+    pub retry: RetrySettings,
     /// Budget.
     pub budget: Budget,
     /// Prices of tokens.
@@ -41,7 +43,8 @@ pub struct PromptSettings {
     /// Number of requests per decision.
     pub steps: PromptSteps,
     /// Form of answers.
-    pub form: AnswerForm,
+    #[serde(alias = "form")]
+    pub answer_format: AnswerForm,
     /// Sampling temperature; absent for the endpoint's default.
     pub temperature: Option<f64>,
     /// Nucleus sampling probability; absent for the endpoint's default.
@@ -49,13 +52,17 @@ pub struct PromptSettings {
     /// Seed of sampling, for endpoints that support it.
     pub seed: Option<u64>,
     /// Maximum tokens of an answer.
-    pub answer_tokens: u32,
+    #[serde(alias = "answer_tokens")]
+    pub max_answer_tokens: u32,
     /// Name of that limit in a request: `max_tokens`, or `max_completion_tokens` for newer models.
-    pub answer_tokens_field: String,
+    #[serde(alias = "answer_tokens_field")]
+    pub max_tokens_field: String,
     /// Maximum tokens of a prompt without images, by [`crate::tokens::estimate`].
-    pub prompt_tokens: u32,
+    #[serde(alias = "prompt_tokens")]
+    pub max_prompt_tokens: u32,
     /// Fields to omit for models that refuse them, for example `temperature`.
-    pub omit: Vec<String>,
+    #[serde(alias = "omit")]
+    pub omit_fields: Vec<String>,
     /// Additional fields of each request.
     pub extra: serde_json::Map<String, serde_json::Value>,
     /// Source of the partner's observed interactions.
@@ -100,7 +107,8 @@ pub enum AnswerForm {
 pub enum BehaviorSource {
     /// The helper's own perception; the `known_task` variants have a grant.
     #[default]
-    Track,
+    #[serde(alias = "track")]
+    Perceived,
     /// Ground truth while the partner is visible: a grant that every trace names.
     Granted,
 }
@@ -155,7 +163,8 @@ pub struct Endpoint {
     /// `AZURE_OPENAI_API_KEY`), or no key on the same machine.
     pub key_env: Option<String>,
     /// Maximum number of concurrent requests.
-    pub in_flight: usize,
+    #[serde(alias = "in_flight")]
+    pub max_concurrent_requests: usize,
     /// Maximum size of an answer, bytes.
     pub max_answer_bytes: u64,
     /// Time limit of a request, seconds.
@@ -179,21 +188,25 @@ pub enum EndpointKind {
 /// Handling of failed requests.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Faults {
+pub struct RetrySettings {
     /// Attempts before a request counts as failed.
-    pub attempts: u32,
+    #[serde(alias = "attempts")]
+    pub max_attempts: u32,
     /// Wait after the first failure, seconds; doubles after each further one.
-    pub first_wait_secs: f32,
+    #[serde(alias = "first_wait_secs")]
+    pub initial_backoff_secs: f32,
     /// Maximum wait, which also limits the endpoint's `Retry-After`, seconds.
-    pub longest_wait_secs: f32,
+    #[serde(alias = "longest_wait_secs")]
+    pub max_backoff_secs: f32,
     /// Consequence for the run.
-    pub then: FaultAction,
+    #[serde(alias = "then")]
+    pub on_failure: FailureAction,
 }
 
 /// Consequence of an unavailable model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum FaultAction {
+pub enum FailureAction {
     /// The run stops and can be resumed; answered requests are not sent again.
     #[default]
     Pause,
@@ -206,15 +219,20 @@ pub enum FaultAction {
 #[serde(deny_unknown_fields, default)]
 pub struct Budget {
     /// Maximum requests, retries included.
-    pub requests: Option<u64>,
+    #[serde(alias = "requests")]
+    pub max_requests: Option<u64>,
     /// Maximum tokens of prompts and answers together.
-    pub tokens: Option<u64>,
+    #[serde(alias = "tokens")]
+    pub max_tokens: Option<u64>,
     /// Maximum cost, in the currency of the prices.
-    pub money: Option<f64>,
+    #[serde(alias = "money")]
+    pub max_cost: Option<f64>,
     /// Maximum minutes of a session.
-    pub minutes: Option<f64>,
+    #[serde(alias = "minutes")]
+    pub max_minutes: Option<f64>,
     /// Consequence of a spent budget.
-    pub then: FaultAction,
+    #[serde(alias = "then")]
+    pub on_exhausted: FailureAction,
 }
 
 /// Prices of tokens.
@@ -243,17 +261,17 @@ impl Default for PromptSettings {
             model: String::new(),
             templates: None,
             steps: PromptSteps::One,
-            form: AnswerForm::Auto,
+            answer_format: AnswerForm::Auto,
             // Facts A3.4.
             temperature: Some(0.7),
             top_p: Some(1.0),
             seed: None,
-            answer_tokens: 512,
-            answer_tokens_field: "max_tokens".to_owned(),
-            prompt_tokens: 4000,
-            omit: Vec::new(),
+            max_answer_tokens: 512,
+            max_tokens_field: "max_tokens".to_owned(),
+            max_prompt_tokens: 4000,
+            omit_fields: Vec::new(),
             extra: serde_json::Map::new(),
-            behavior: BehaviorSource::Track,
+            behavior: BehaviorSource::Perceived,
             fallback: Fallback::Explore,
             frames_per_second: 0.0,
             wait_frames: 50,
@@ -275,7 +293,7 @@ impl Default for Endpoint {
             kind: EndpointKind::Openai,
             api_version: "2024-10-21".to_owned(),
             key_env: None,
-            in_flight: 16,
+            max_concurrent_requests: 16,
             max_answer_bytes: 1 << 20,
             timeout_secs: 120.0,
             allow_http: false,
@@ -283,13 +301,13 @@ impl Default for Endpoint {
     }
 }
 
-impl Default for Faults {
-    fn default() -> Faults {
-        Faults {
-            attempts: 8,
-            first_wait_secs: 1.0,
-            longest_wait_secs: 60.0,
-            then: FaultAction::Pause,
+impl Default for RetrySettings {
+    fn default() -> RetrySettings {
+        RetrySettings {
+            max_attempts: 8,
+            initial_backoff_secs: 1.0,
+            max_backoff_secs: 60.0,
+            on_failure: FailureAction::Pause,
         }
     }
 }
@@ -310,11 +328,11 @@ impl Settings {
             toml::from_str(&text).map_err(|e| wrong(message_with_line(&text, &e)))?;
         // TOML has no null; nan and inf become null in JSON.
         if let Some((name, _)) =
-            settings.asking.extra.iter().find(|(_, value)| contains_null(value))
+            settings.request.extra.iter().find(|(_, value)| contains_null(value))
         {
-            return Err(wrong(format!("asking.extra.{name} is no finite number")));
+            return Err(wrong(format!("request.extra.{name} is no finite number")));
         }
-        if let Some(folder) = &mut settings.asking.templates
+        if let Some(folder) = &mut settings.request.templates
             && folder.is_relative()
         {
             // Relative to the configuration file.
@@ -361,7 +379,7 @@ mod tests {
 
     pub(super) fn valid_settings() -> Settings {
         let mut settings = Settings::default();
-        settings.asking.model = "m".to_owned();
+        settings.request.model = "m".to_owned();
         settings.endpoint.url = "http://127.0.0.1:8000/v1".to_owned();
         settings
     }
@@ -384,16 +402,22 @@ mod tests {
     fn missing_fields_have_defaults_and_unknown_fields_are_refused() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("llm.toml");
-        fs::write(&path, "[asking]\nmodel = \"m\"\ntemplates = \"mine\"\n[budget]\nrequests = 5\n")
-            .unwrap();
+        fs::write(
+            &path,
+            "[request]\nmodel = \"m\"\ntemplates = \"mine\"\n[budget]\nmax_requests = 5\n",
+        )
+        .unwrap();
         let settings = Settings::read(&path).unwrap();
-        assert_eq!(settings.asking.templates, Some(dir.path().join("mine")));
-        assert_eq!((settings.budget.requests, settings.asking.answer_tokens), (Some(5), 512));
-        fs::write(&path, "[asking]\nmodel_name = \"m\"\n").unwrap();
+        assert_eq!(settings.request.templates, Some(dir.path().join("mine")));
+        assert_eq!(
+            (settings.budget.max_requests, settings.request.max_answer_tokens),
+            (Some(5), 512)
+        );
+        fs::write(&path, "[request]\nmodel_name = \"m\"\n").unwrap();
         let error = Settings::read(&path).unwrap_err().to_string();
         assert!(error.contains("model_name") && error.contains("llm.toml"), "{error}");
         for text in ["top_k = nan", "deep = { list = [1.0, inf] }"] {
-            fs::write(&path, format!("[asking.extra]\n{text}\n")).unwrap();
+            fs::write(&path, format!("[request.extra]\n{text}\n")).unwrap();
             let error = Settings::read(&path).unwrap_err().to_string();
             assert!(error.contains("is no finite number"), "{error}");
         }

@@ -44,7 +44,8 @@ pub(super) struct Response {
 impl Wire {
     pub(super) fn new(settings: &Settings, key: Key) -> Wire {
         let endpoint = &settings.endpoint;
-        let Endpoint { kind, max_answer_bytes, timeout_secs, in_flight, .. } = *endpoint;
+        let Endpoint { kind, max_answer_bytes, timeout_secs, max_concurrent_requests, .. } =
+            *endpoint;
         let timeout = Duration::from_secs_f32(timeout_secs);
         let mut config = Agent::config_builder()
             .http_status_as_error(false)
@@ -54,13 +55,13 @@ impl Wire {
             .timeout_global(Some(timeout))
             .timeout_resolve(Some(timeout.min(CONNECT)))
             .timeout_connect(Some(timeout.min(CONNECT)))
-            .max_idle_connections_per_host(in_flight)
+            .max_idle_connections_per_host(max_concurrent_requests)
             .user_agent(concat!("chaic/", env!("CARGO_PKG_VERSION")));
         if endpoint.is_local() {
             config = config.proxy(None);
         }
         let agent = config.build().new_agent();
-        let address = address(endpoint, &settings.asking.model);
+        let address = address(endpoint, &settings.request.model);
         Wire { agent, address, kind, key, max_answer_bytes }
     }
 

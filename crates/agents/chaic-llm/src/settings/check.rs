@@ -36,30 +36,30 @@ impl Settings {
     /// # Errors
     /// [`LlmError::Setting`] for the first invalid setting.
     pub fn check_bounds(&self) -> Result<()> {
-        let Settings { asking, endpoint, faults, budget, price } = self;
-        if asking.model.is_empty() {
-            return wrong("asking.model", "empty", "the model's name; give --model");
+        let Settings { request, endpoint, retry, budget, price } = self;
+        if request.model.is_empty() {
+            return wrong("request.model", "empty", "the model's name; give --model");
         }
-        check_optional("asking.temperature", asking.temperature, TEMPERATURE)?;
-        check_optional("asking.top_p", asking.top_p, 0.0..=1.0)?;
-        check_range("asking.answer_tokens", asking.answer_tokens, 1..=1_000_000)?;
-        check_range("asking.prompt_tokens", asking.prompt_tokens, 500..=1_000_000)?;
-        check_range("asking.images.count", asking.images.count, 1..=100)?;
-        check_range("asking.images.size", asking.images.size, 16..=2048)?;
-        check_range("asking.wait_frames", asking.wait_frames, 1..=3000)?;
-        check_range("asking.frames_per_second", asking.frames_per_second, 0.0..=1000.0)?;
-        check_range("endpoint.in_flight", endpoint.in_flight, 1..=256)?;
+        check_optional("request.temperature", request.temperature, TEMPERATURE)?;
+        check_optional("request.top_p", request.top_p, 0.0..=1.0)?;
+        check_range("request.max_answer_tokens", request.max_answer_tokens, 1..=1_000_000)?;
+        check_range("request.max_prompt_tokens", request.max_prompt_tokens, 500..=1_000_000)?;
+        check_range("request.images.count", request.images.count, 1..=100)?;
+        check_range("request.images.size", request.images.size, 16..=2048)?;
+        check_range("request.wait_frames", request.wait_frames, 1..=3000)?;
+        check_range("request.frames_per_second", request.frames_per_second, 0.0..=1000.0)?;
+        check_range("endpoint.max_concurrent_requests", endpoint.max_concurrent_requests, 1..=256)?;
         check_range("endpoint.max_answer_bytes", endpoint.max_answer_bytes, ANSWER_BYTES)?;
         check_range("endpoint.timeout_secs", endpoint.timeout_secs, SECS)?;
-        check_range("faults.attempts", faults.attempts, 1..=100)?;
-        check_range("faults.first_wait_secs", faults.first_wait_secs, SECS)?;
-        check_range("faults.longest_wait_secs", faults.longest_wait_secs, SECS)?;
-        check_optional("budget.money", budget.money, MONEY)?;
-        check_optional("budget.minutes", budget.minutes, MINUTES)?;
+        check_range("retry.max_attempts", retry.max_attempts, 1..=100)?;
+        check_range("retry.initial_backoff_secs", retry.initial_backoff_secs, SECS)?;
+        check_range("retry.max_backoff_secs", retry.max_backoff_secs, SECS)?;
+        check_optional("budget.max_cost", budget.max_cost, MONEY)?;
+        check_optional("budget.max_minutes", budget.max_minutes, MINUTES)?;
         check_range("price.prompt_per_million", price.prompt_per_million, MONEY)?;
         check_range("price.answer_per_million", price.answer_per_million, MONEY)?;
-        if budget.money.is_some() && price.prompt_per_million + price.answer_per_million == 0.0 {
-            return wrong("budget.money", "given", "prices in [price] to go with it");
+        if budget.max_cost.is_some() && price.prompt_per_million + price.answer_per_million == 0.0 {
+            return wrong("budget.max_cost", "given", "prices in [price] to go with it");
         }
         Ok(())
     }
@@ -167,17 +167,20 @@ mod tests {
     fn valid_settings_pass_and_invalid_ones_are_named() {
         valid_settings().check().unwrap();
         let changes: [(Change, &str); 11] = [
-            (|s| s.asking.model.clear(), "--model"),
+            (|s| s.request.model.clear(), "--model"),
             (|s| s.endpoint.url.clear(), "--endpoint"),
             (|s| s.endpoint.url = "ftp://x".to_owned(), "http://127.0.0.1"),
             (|s| s.endpoint.url = "https://me:sesame@x/v1".to_owned(), "bare address"),
             (|s| s.endpoint.url = "https://x/v1?key=sesame".to_owned(), "bare address"),
             (|s| s.endpoint.key_env = Some("sk-sesame".to_owned()), "endpoint.key_env is no name"),
             (|s| s.endpoint.api_version = "1&x=2".to_owned(), "endpoint.api_version"),
-            (|s| s.endpoint.in_flight = 0, "endpoint.in_flight is 0"),
-            (|s| s.faults.attempts = 0, "faults.attempts is 0"),
-            (|s| s.budget.money = Some(1.0), "[price]"),
-            (|s| s.asking.prompt_tokens = 10, "asking.prompt_tokens is 10, expected 500 to"),
+            (|s| s.endpoint.max_concurrent_requests = 0, "endpoint.max_concurrent_requests is 0"),
+            (|s| s.retry.max_attempts = 0, "retry.max_attempts is 0"),
+            (|s| s.budget.max_cost = Some(1.0), "[price]"),
+            (
+                |s| s.request.max_prompt_tokens = 10,
+                "request.max_prompt_tokens is 10, expected 500 to",
+            ),
         ];
         for (change, expected) in changes {
             let error = refused(change);
@@ -189,13 +192,13 @@ mod tests {
     fn nan_and_values_out_of_range_are_refused() {
         type Set = fn(&mut Settings, f64);
         let fields: [(Set, &str); 9] = [
-            (|s, x| s.asking.temperature = Some(x), "asking.temperature"),
-            (|s, x| s.asking.top_p = Some(x), "asking.top_p"),
-            (|s, x| s.asking.frames_per_second = x as f32, "asking.frames_per_second"),
+            (|s, x| s.request.temperature = Some(x), "request.temperature"),
+            (|s, x| s.request.top_p = Some(x), "request.top_p"),
+            (|s, x| s.request.frames_per_second = x as f32, "request.frames_per_second"),
             (|s, x| s.endpoint.timeout_secs = x as f32, "endpoint.timeout_secs"),
-            (|s, x| s.faults.longest_wait_secs = x as f32, "faults.longest_wait_secs"),
-            (|s, x| s.budget.money = Some(x), "budget.money"),
-            (|s, x| s.budget.minutes = Some(x), "budget.minutes"),
+            (|s, x| s.retry.max_backoff_secs = x as f32, "retry.max_backoff_secs"),
+            (|s, x| s.budget.max_cost = Some(x), "budget.max_cost"),
+            (|s, x| s.budget.max_minutes = Some(x), "budget.max_minutes"),
             (|s, x| s.price.prompt_per_million = x, "price.prompt_per_million"),
             (|s, x| s.price.answer_per_million = x, "price.answer_per_million"),
         ];
@@ -208,8 +211,8 @@ mod tests {
                 assert!(settings.check_bounds().is_err(), "also without an endpoint");
             }
         }
-        let error = refused(|s| s.asking.temperature = Some(f64::NAN));
-        assert_eq!(error, "asking.temperature is NaN, expected 0 to 2");
+        let error = refused(|s| s.request.temperature = Some(f64::NAN));
+        assert_eq!(error, "request.temperature is NaN, expected 0 to 2");
     }
 
     #[test]

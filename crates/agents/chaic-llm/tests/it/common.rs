@@ -10,7 +10,7 @@ use chaic_eval::metrics::{RunResult, Summary};
 use chaic_eval::run::{FolderMode, Run, RunRequest};
 use chaic_llm::exchange::{DecisionRecord, Exchange};
 use chaic_llm::record::{self, DecisionLog, RecordEntry};
-use chaic_llm::settings::FaultAction;
+use chaic_llm::settings::FailureAction;
 use chaic_llm::{LanguageHelpers, Settings};
 use chaic_llm_standin::{Options, StandIn};
 
@@ -92,12 +92,12 @@ pub fn standin(options: Options) -> (StandIn, Settings) {
 
 pub fn settings(url: &str) -> Settings {
     let mut settings = Settings::default();
-    settings.asking.model = "standin".to_owned();
+    settings.request.model = "standin".to_owned();
     settings.endpoint.url = url.to_owned();
     settings.endpoint.timeout_secs = 0.25;
-    settings.faults.first_wait_secs = 0.001;
-    settings.faults.longest_wait_secs = 0.02;
-    settings.faults.then = FaultAction::Fallback;
+    settings.retry.initial_backoff_secs = 0.001;
+    settings.retry.max_backoff_secs = 0.02;
+    settings.retry.on_failure = FailureAction::Fallback;
     settings
 }
 

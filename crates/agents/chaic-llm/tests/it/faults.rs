@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use chaic_core::TaskId;
 use chaic_llm::LanguageHelpers;
-use chaic_llm::settings::FaultAction;
+use chaic_llm::settings::FailureAction;
 use chaic_llm_standin::Options;
 use chaic_llm_standin::faults::FaultKind;
 
@@ -48,8 +48,8 @@ fn an_endpoint_that_is_gone_pauses_the_run_and_one_that_is_back_finishes_it() {
     let fixture = Fixture::new(&[TaskId::NoConstraint, TaskId::Obstacle], 150);
     let request = fixture.request(&["llm", "random"]);
     let (gone, mut settings) = standin(Options::default());
-    settings.faults.then = FaultAction::Pause;
-    settings.faults.attempts = 3;
+    settings.retry.on_failure = FailureAction::Pause;
+    settings.retry.max_attempts = 3;
     drop(gone);
     let language = LanguageHelpers::live(settings.clone(), flag()).unwrap();
     let (is_complete, results) = fixture.play("run", &request, &language);
@@ -74,7 +74,7 @@ fn permanent_failures_are_not_retried() {
     let fixture = Fixture::new(&[TaskId::NoConstraint], 100);
     let key = Some("right".to_owned());
     let (standin, mut settings) = standin(Options { key, ..Options::default() });
-    settings.faults.then = FaultAction::Pause;
+    settings.retry.on_failure = FailureAction::Pause;
     let language = LanguageHelpers::live(settings, flag()).unwrap();
     assert!(!fixture.play("run", &fixture.request(&["llm"]), &language).0);
     assert_eq!(standin.stats().requests, 1);

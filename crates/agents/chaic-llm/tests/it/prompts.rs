@@ -46,7 +46,7 @@ fn prompts_are_shortened_until_they_fit() {
     let mut lengths = Vec::new();
     for limit in [4000, 900] {
         let (_standin, mut settings) = standin(Options::default());
-        settings.asking.prompt_tokens = limit;
+        settings.request.max_prompt_tokens = limit;
         let language = LanguageHelpers::live(settings, flag()).unwrap();
         let name = format!("run{limit}");
         assert!(fixture.play(&name, &fixture.request(&["llm"]), &language).0);

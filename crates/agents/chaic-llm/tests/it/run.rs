@@ -8,7 +8,7 @@ use chaic_env::helper_registry::HelperRegistry as _;
 use chaic_eval::run::RunFolder;
 use chaic_eval::verify::verify_run;
 use chaic_llm::exchange::{DecisionSource, Purpose, Reply};
-use chaic_llm::settings::{AnswerForm, Fallback, FaultAction, ImageEncoding, PromptSteps};
+use chaic_llm::settings::{AnswerForm, FailureAction, Fallback, ImageEncoding, PromptSteps};
 use chaic_llm::{LanguageHelpers, record};
 use chaic_llm_standin::{Options, ResponseMode};
 
@@ -19,7 +19,7 @@ fn a_replay_is_identical_bit_for_bit() {
     let fixture = Fixture::new(&[TaskId::NoConstraint, TaskId::Shopping], 400);
     let (standin, mut settings) = standin(Options::default());
     // The charge for thinking is part of the record.
-    settings.asking.frames_per_second = 200.0;
+    settings.request.frames_per_second = 200.0;
     let request = fixture.request(&["none", "llm", "llm_known_task", "vlm"]);
     let language = LanguageHelpers::live(settings, flag()).unwrap();
     let (is_complete, results) = fixture.play("live", &request, &language);
@@ -92,7 +92,7 @@ fn answered_requests_are_not_repeated_after_a_pause() {
     let results = loop {
         sessions += 1;
         let mut settings = settings.clone();
-        settings.budget.requests = Some(2 * sessions);
+        settings.budget.max_requests = Some(2 * sessions);
         let language = LanguageHelpers::live(settings, flag()).unwrap();
         let (is_complete, results) = fixture.play("cut", &request, &language);
         if is_complete {
@@ -111,10 +111,10 @@ fn answered_requests_are_not_repeated_after_a_pause() {
     );
     // Resuming requires equal settings.
     let mut other = settings;
-    other.asking.temperature = Some(0.1);
+    other.request.temperature = Some(0.1);
     let language = LanguageHelpers::live(other, flag()).unwrap();
     let error = language.attach(&fixture.path("cut")).unwrap_err().to_string();
-    assert!(error.contains("asking.temperature 0.7, not 0.1"), "{error}");
+    assert!(error.contains("request.temperature 0.7, not 0.1"), "{error}");
 }
 
 #[test]
@@ -123,12 +123,12 @@ fn budgets_are_exceeded_by_one_request_at_most_and_the_fallback_continues() {
     let request = fixture.request(&["llm", "llm_known_task"]);
     for (k, money) in [None, Some(0.004)].into_iter().enumerate() {
         let (standin, mut settings) = standin(Options::default());
-        settings.budget.then = FaultAction::Fallback;
-        settings.asking.fallback = Fallback::Rules;
+        settings.budget.on_exhausted = FailureAction::Fallback;
+        settings.request.fallback = Fallback::Rules;
         settings.price.prompt_per_million = 1.0;
         settings.price.answer_per_million = 2.0;
-        settings.budget.money = money;
-        settings.budget.tokens = money.is_none().then_some(3000);
+        settings.budget.max_cost = money;
+        settings.budget.max_tokens = money.is_none().then_some(3000);
         let language = LanguageHelpers::live(settings, flag()).unwrap();
         let (is_complete, results) = fixture.play(&format!("run{k}"), &request, &language);
         assert!(is_complete && results.len() == 6);
@@ -144,7 +144,7 @@ fn budgets_are_exceeded_by_one_request_at_most_and_the_fallback_continues() {
             None => assert!((3000..3000 + max_tokens).contains(&spent.tokens), "{spent:?}"),
             Some(money) => {
                 let max_money = money + 2.0 * max_tokens as f64 / 1e6;
-                assert!(spent.money >= money && spent.money < max_money, "{spent:?}");
+                assert!(spent.cost >= money && spent.cost < max_money, "{spent:?}");
             }
         }
         assert_eq!(spent.requests as usize, standin.stats().requests);
@@ -163,9 +163,9 @@ fn two_steps_and_refused_schemas_work() {
     let fixture = Fixture::new(&[TaskId::LowTarget], 250);
     let request = fixture.request(&["vlm"]);
     let (server, mut settings) = standin(Options::default());
-    settings.asking.steps = PromptSteps::Two;
-    settings.asking.images.format = ImageEncoding::Jpeg;
-    settings.asking.images.count = 3;
+    settings.request.steps = PromptSteps::Two;
+    settings.request.images.format = ImageEncoding::Jpeg;
+    settings.request.images.count = 3;
     let language = LanguageHelpers::live(settings.clone(), flag()).unwrap();
     assert!(fixture.play("two", &request, &language).0);
     for record in fixture.records("two") {
@@ -185,10 +185,10 @@ fn two_steps_and_refused_schemas_work() {
     assert!(is_complete);
     assert_eq!(server.stats().with_schema, 1, "it is tried once in an episode");
     assert!(!summary(&results[0]).counts.contains_key("helper.fallback_fault"));
-    settings.asking.form = AnswerForm::Schema;
+    settings.request.answer_format = AnswerForm::Schema;
     let language = LanguageHelpers::live(settings, flag()).unwrap();
     assert!(!fixture.play("schema_only", &request, &language).0);
-    assert!(language.problem().unwrap().contains("asking.form"));
+    assert!(language.problem().unwrap().contains("request.answer_format"));
 }
 
 #[test]
@@ -200,7 +200,7 @@ fn an_invalid_answer_is_requested_once_more_with_the_reason() {
         let answer = |_: &chaic_llm_standin::script::Question| "I would rather not.".to_owned();
         let response_mode = ResponseMode::Function(Box::new(answer));
         let (standin, mut settings) = standin(Options { response_mode, ..Options::default() });
-        settings.asking.fallback = fallback;
+        settings.request.fallback = fallback;
         let name = format!("{fallback:?}");
         let language = LanguageHelpers::live(settings, flag()).unwrap();
         let (is_complete, results) = fixture.play(&name, &fixture.request(&["llm"]), &language);
@@ -262,7 +262,7 @@ fn requests_in_flight_do_not_block_other_episodes() {
         ..Options::default()
     });
     settings.endpoint.timeout_secs = 600.0;
-    settings.endpoint.in_flight = 16;
+    settings.endpoint.max_concurrent_requests = 16;
     let language = LanguageHelpers::live(settings, flag()).unwrap();
     let mut request = fixture.request(&["none", "random", "llm", "llm_known_task"]);
     request.seeds = Some(2);

@@ -5,7 +5,7 @@ use chaic_llm::endpoint::Client;
 use chaic_llm::key::Key;
 use chaic_llm::language::LanguageHelpers;
 use chaic_llm::session::Source;
-use chaic_llm::settings::{EndpointKind, FaultAction};
+use chaic_llm::settings::{EndpointKind, FailureAction};
 use chaic_llm::show::{self, Detail};
 use chaic_llm_standin::{Options, ResponseMode};
 
@@ -29,7 +29,7 @@ fn no_output_or_file_contains_the_key() {
         let key = Some(right.to_owned());
         let (standin, mut settings) = standin(Options { response_mode, key, ..Options::default() });
         settings.endpoint.kind = kind;
-        settings.faults.then = FaultAction::Pause;
+        settings.retry.on_failure = FailureAction::Pause;
         let client = Client::with_key(&settings, Key::new(KEY));
         let language =
             LanguageHelpers::with(settings, Source::Live(Box::new(client)), flag()).unwrap();
@@ -59,7 +59,7 @@ fn redirects_are_not_followed() {
     let (other, _) = standin(Options::default());
     let redirects_to = Some(format!("{}/chat/completions", other.url()));
     let (named, mut settings) = standin(Options { redirects_to, ..Options::default() });
-    settings.faults.then = FaultAction::Pause;
+    settings.retry.on_failure = FailureAction::Pause;
     let client = Client::with_key(&settings, Key::new(KEY));
     let language = LanguageHelpers::with(settings, Source::Live(Box::new(client)), flag()).unwrap();
     let (is_complete, _) = fixture.play("run", &fixture.request(&["llm"]), &language);

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 
 use chaic_core::TaskId;
 use chaic_llm::LanguageHelpers;
-use chaic_llm::settings::FaultAction;
+use chaic_llm::settings::FailureAction;
 use chaic_llm_standin::script::Question;
 use chaic_llm_standin::{Options, ResponseMode};
 
@@ -36,7 +36,7 @@ fn a_stopped_run_does_not_wait_and_resumes_later() {
     let response_mode = ResponseMode::Function(Box::new(answer));
     let (_stalling_server, mut stalling) = standin(Options { response_mode, ..Options::default() });
     stalling.endpoint.timeout_secs = 86_400.0;
-    stalling.faults.then = FaultAction::Pause;
+    stalling.retry.on_failure = FailureAction::Pause;
     let language = LanguageHelpers::live(stalling, stop_flag).unwrap();
     let (is_complete, results) = fixture.play("cut", &request, &language);
     assert!(!is_complete && results.is_empty());
@@ -60,7 +60,7 @@ fn an_unreachable_endpoint_is_reported_before_the_run_pauses() {
     let fixture = Fixture::new(&[TaskId::NoConstraint], 100);
     let (gone, _) = standin(Options::default());
     let mut settings = settings(&gone.url());
-    settings.faults.then = FaultAction::Pause;
+    settings.retry.on_failure = FailureAction::Pause;
     drop(gone);
     let stop_flag = flag();
     let language = LanguageHelpers::live(settings, stop_flag).unwrap();

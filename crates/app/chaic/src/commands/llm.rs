@@ -41,7 +41,7 @@ pub fn run(command: &LlmCommand, format: OutputFormat) -> Result<ExitStatus> {
             Templates::load(None)?.write(out)?;
             let text = format!(
                 "{0}: the templates of the prompts; edit them, and name the folder in a \
-                 configuration file:\n[asking]\ntemplates = \"{0}\"\n",
+                 configuration file:\n[request]\ntemplates = \"{0}\"\n",
                 out.display()
             );
             print_result(format, &json!({ "out": out }), &text)?;

@@ -94,13 +94,13 @@ fn settings_out_of_range_are_refused() {
     let server = standin(Options::default());
     let url = server.url();
     for (text, words) in [
-        ("[asking]\ntemperature = nan", "asking.temperature is NaN, expected 0 to 2"),
-        ("[asking]\ntemperature = -0.1", "asking.temperature is -0.1"),
-        ("[asking]\ntop_p = inf", "asking.top_p is inf, expected 0 to 1"),
-        ("[asking]\ntop_p = 1.5", "asking.top_p is 1.5"),
-        ("[asking.extra]\nmin_p = nan", "asking.extra.min_p is no finite number"),
-        ("[budget]\nmoney = nan", "budget.money is NaN"),
-        ("[budget]\nminutes = -1.0", "budget.minutes is -1"),
+        ("[request]\ntemperature = nan", "request.temperature is NaN, expected 0 to 2"),
+        ("[request]\ntemperature = -0.1", "request.temperature is -0.1"),
+        ("[request]\ntop_p = inf", "request.top_p is inf, expected 0 to 1"),
+        ("[request]\ntop_p = 1.5", "request.top_p is 1.5"),
+        ("[request.extra]\nmin_p = nan", "request.extra.min_p is no finite number"),
+        ("[budget]\nmax_cost = nan", "budget.max_cost is NaN"),
+        ("[budget]\nmax_minutes = -1.0", "budget.max_minutes is -1"),
         ("[budget]\ntokens = -1", "expected u64"),
         ("[budget]\nrequests = 1.5", "expected u64"),
         ("[price]\nprompt_per_million = inf", "price.prompt_per_million is inf"),

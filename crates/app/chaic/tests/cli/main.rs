@@ -328,7 +328,7 @@ fn language_helpers_from_an_endpoint_to_the_report() {
     run_ok(at, &["llm", "templates", "--out", "mine"]);
     assert!(at.join("mine/task.txt").exists());
     fs::write(at.join("mine/task.txt"), "{{ nonsense }}").expect("the disk has space");
-    fs::write(at.join("mine.toml"), "[asking]\ntemplates = \"mine\"\n")
+    fs::write(at.join("mine.toml"), "[request]\ntemplates = \"mine\"\n")
         .expect("the disk has space");
     let llm = ["eval", "--episodes", "short", "--helper", "llm", "--out", "r"];
     let remote = "https://models.example.org/v1";
@@ -356,7 +356,7 @@ fn language_helpers_from_an_endpoint_to_the_report() {
     ];
     fs::write(at.join("nokey.toml"), "[endpoint]\nkey_env = \"CHAIC_TEST_NO_KEY\"\n")
         .expect("the disk has space");
-    fs::write(at.join("quick.toml"), "[faults]\nattempts = 1\n").expect("the disk has space");
+    fs::write(at.join("quick.toml"), "[retry]\nmax_attempts = 1\n").expect("the disk has space");
     for (arguments, words) in mistyped {
         let message = run_err(at, &[&llm[..], arguments].concat());
         assert!(message.contains(words) && !message.contains("sesame"), "{arguments:?}: {message}");

@@ -74,7 +74,7 @@ fn unknown_and_doubly_set_keys_are_one_line_and_nothing_is_written() {
         assert!(message.contains("c.toml: ") && message.contains(reply), "{message}");
         assert_eq!(message.lines().count(), 1, "{message}");
     }
-    fs::write(at.join("llm.toml"), "[asking]\nmodle = \"m\"\n").expect("it is written");
+    fs::write(at.join("llm.toml"), "[request]\nmodle = \"m\"\n").expect("it is written");
     let play = ["eval", "--helper", "llm", "--llm-config", "llm.toml", "--out", "o"];
     let out = output_of(at, &play);
     let message = text(&out.stderr);

@@ -217,10 +217,10 @@ fn llm_config(inputs: &Inputs, bytes: &[u8]) -> Result<(), String> {
 
 fn llm_configs() -> Vec<Vec<u8>> {
     let mut settings = Settings::default();
-    settings.asking.model = "m".to_owned();
+    settings.request.model = "m".to_owned();
     settings.endpoint.url = "http://localhost:8000/v1".to_owned();
     let text = toml::to_string(&settings).expect("settings serialize to TOML");
-    let extra = "[asking]\nmodel = \"m\"\n[asking.extra]\ntop_k = 5\n[endpoint]\nurl = \"http://[::1]:1/v1\"\n";
+    let extra = "[request]\nmodel = \"m\"\n[request.extra]\ntop_k = 5\n[endpoint]\nurl = \"http://[::1]:1/v1\"\n";
     vec![text.into(), extra.as_bytes().to_vec()]
 }
 

@@ -155,7 +155,7 @@ def test_invalid_arguments_are_refused(tmp_path):
         (ValueError, lambda: chaic.evaluate({"a/b": Turner}, out=out, **OPTIONS)),
         (ValueError, lambda: chaic.evaluate({"a": Turner, "b": Rhp}, out=out, **OPTIONS)),
         (ValueError, lambda: chaic.evaluate(Turner, out=out, **{**OPTIONS, "tasks": "flying"})),
-        (ValueError, lambda: chaic.evaluate(Turner, out=out, track="hiden", **OPTIONS)),
+        (ValueError, lambda: chaic.evaluate(Turner, out=out, track="open", **OPTIONS)),
         (ValueError, lambda: chaic.evaluate(Turner, out=out, rules="papr", **OPTIONS)),
         (ValueError, lambda: chaic.evaluate(Turner, out=out, baselines=["rpp"], **OPTIONS)),
         (TypeError, lambda: chaic.evaluate(Turner, out=out, colour="red", **OPTIONS)),

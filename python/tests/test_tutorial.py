@@ -1,6 +1,9 @@
 """The code of docs/tutorial-python.md and of the README runs, and its helpers beat no helper."""
 
+import json
 import re
+import sys
+import types
 from pathlib import Path
 
 import pytest
@@ -43,3 +46,19 @@ def test_the_code_runs_and_its_helper_beats_no_helper(page, n_blocks, tmp_path, 
     tr = mean_tr(run)
     assert tr["carrier"] > tr["none"] + 0.1, tr
     assert not run.records()["failed"].any()
+
+
+def test_the_cells_of_the_notebook_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    display = types.ModuleType("IPython.display")
+    display.Image = bytes
+    monkeypatch.setitem(sys.modules, "IPython", types.ModuleType("IPython"))
+    monkeypatch.setitem(sys.modules, "IPython.display", display)
+    notebook = json.loads((ROOT / "examples/python/quickstart.ipynb").read_text())
+    cells = ["".join(cell["source"]) for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    # The last one renders a video, which takes half a minute.
+    assert cells.pop().startswith("run.replay(")
+    namespace: dict[str, object] = {}
+    for number, cell in enumerate(cells, 1):
+        exec(compile(cell.replace("n_episodes=2", "n_episodes=1"), f"cell {number}", "exec"), namespace)
+    assert isinstance(namespace["run"], chaic.Run)

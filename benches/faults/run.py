@@ -27,11 +27,11 @@ plan-not-listed huge invalid-utf8""".split()
 CONFIG = """
 [endpoint]
 timeout_secs = 0.3
-[faults]
-attempts = 8
-first_wait_secs = 0.005
-longest_wait_secs = 2.0
-then = "fallback"
+[retry]
+max_attempts = 8
+initial_backoff_secs = 0.005
+max_backoff_secs = 2.0
+on_failure = "fallback"
 """
 
 
@@ -55,7 +55,7 @@ def play(chaic, standin, args, kind):
         command = [chaic, "eval", "--split", "test", "--helper", args.helper, "--jobs", "8"]
         command += ["--llm-config", config, "--endpoint", address, "--model", "standin"]
         command += ["--no-traces", "--out", out]
-        command += ["--n-episodes", str(args.first)] if args.first else []
+        command += ["--n-episodes", str(args.n_episodes)] if args.n_episodes else []
         with open(args.out / f"{kind}.log", "w") as log:
             subprocess.run(command, stdout=log, stderr=log, check=False)
     lines = (out / "results.jsonl").read_text().splitlines()
@@ -66,7 +66,7 @@ def main():
     args = arguments()
     args.out.mkdir(parents=True, exist_ok=True)
     chaic, standin = programs()
-    expected = 8 * (args.first or 12)
+    expected = 8 * (args.n_episodes or 12)
     print("| fault | episodes scored | questions | requests | failed | fallbacks | minutes |")
     print("|---|---|---|---|---|---|---|")
     lost = 0

@@ -29,23 +29,23 @@ def kind_of(action: Any) -> int:
 
 
 def export(name: str, path: Path) -> None:
-    """Plays an episode with the oracle and writes its downsampled depth, its own state and its actions."""
+    """Plays an episode with the oracle and writes its downsampled depth, its proprioception and its actions."""
     oracle = chaic.PlanningAgent("oracle")
     world = chaic.World(
         chaic.Episode(name), images=["rgb", "depth", "ids"], image_size=512, grants=oracle.grants
     )
     oracle.reset(world.briefing())
-    depth, own, kinds = [], [], []
+    depth, proprioception, kinds = [], [], []
     while world.advance() == "needs_action":
         observation = world.observe()
         action = oracle.act(observation)
         assert observation.depth is not None
         step = 512 // SIZE
         depth.append(observation.depth[step // 2 :: step, step // 2 :: step].astype(np.float16))
-        own.append(world.proprioception()[0])
+        proprioception.append(world.proprioception()[0])
         kinds.append(kind_of(action))
         world.submit(action)
-    np.savez_compressed(path, depth=depth, own=own, kind=kinds)
+    np.savez_compressed(path, depth=depth, proprioception=proprioception, kind=kinds)
 
 
 class Imitator(nn.Module):
@@ -59,10 +59,10 @@ class Imitator(nn.Module):
         )
         self.head = nn.Linear(64 + len(chaic.PROPRIOCEPTION), len(chaic.ACTIONS))
 
-    def forward(self, depth: torch.Tensor, own: torch.Tensor) -> torch.Tensor:
+    def forward(self, depth: torch.Tensor, proprioception: torch.Tensor) -> torch.Tensor:
         """Returns a logit for each kind."""
         features = self.encoder(depth[:, None].clamp(0, 10) / 10)
-        return self.head(torch.cat([features, own], 1))
+        return self.head(torch.cat([features, proprioception], 1))
 
 
 def main() -> None:
@@ -79,22 +79,22 @@ def main() -> None:
         if not path.exists():
             export(name, path)
     played = [np.load(path) for path in files]
-    depth, own, kind = (
+    depth, proprioception, kind = (
         torch.from_numpy(np.concatenate([p[part] for p in played])) for part in ("depth", "proprioception", "kind")
     )
     print(f"{len(kind)} decisions of {len(names)} episodes")
     model, n = Imitator(), len(kind)
     held_out = torch.arange(n) >= n - len(played[-1]["kind"])
-    model(depth[:1].float(), own[:1])
+    model(depth[:1].float(), proprioception[:1])
     optimizer = torch.optim.Adam(model.parameters(), 1e-3)
     for epoch in range(arguments.epochs):
         for part in torch.randperm(int((~held_out).sum())).split(64):
-            loss = nn.functional.cross_entropy(model(depth[part].float(), own[part]), kind[part])
+            loss = nn.functional.cross_entropy(model(depth[part].float(), proprioception[part]), kind[part])
             optimizer.zero_grad()
             loss.backward()
             optimizer.step()
         with torch.no_grad():
-            predicted = model(depth[held_out].float(), own[held_out]).argmax(1)
+            predicted = model(depth[held_out].float(), proprioception[held_out]).argmax(1)
             accuracy = (predicted == kind[held_out]).float().mean()
             baseline = (kind[held_out] == kind[~held_out].mode().values).float().mean()
         print(f"epoch {epoch + 1}: accuracy {accuracy:.3f} on the last episode (most frequent kind: {baseline:.3f})")

@@ -94,8 +94,8 @@ def evaluate(
     ``chaic report``, ``chaic verify`` and ``chaic replay`` read the folder.
 
     A helper that raises an exception scores zero for that episode, with the traceback in results.jsonl, and the run
-    continues. The same holds for one that needs more than ``limit_s`` seconds for one action: ``TimeoutError`` is raised in
-    it. That stops Python code, but a call into C only when it returns. A helper that may hang there should be a separate
+    continues. The same holds for one that needs more than ``limit_s`` seconds for one action: an exception is raised in it,
+    which handlers of ``Exception`` do not catch. That stops Python code, but a call into C only when it returns. A helper that may hang there should be a separate
     process (docs/subprocess-helpers.md).
 
     ``isolate=True`` runs the helpers in separate processes in the sandbox of docs/threat-model.md. There a helper reads its
@@ -281,7 +281,7 @@ class Run:
         if not path.exists():
             return []
         # Messages in the lines may contain other line separators. The last line of a killed run can be incomplete.
-        *lines, _ = path.read_text(encoding="utf-8").split("\n")
+        *lines, _ = path.read_bytes().split(b"\n")
         results = [json.loads(line) for line in lines if line]
         by_key = {(r["helper"], r["task"], r["episode"], r.get("seed", 0)): r for r in results}
         return [by_key[key] for key in sorted(by_key)]

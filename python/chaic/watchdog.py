@@ -5,8 +5,7 @@ from __future__ import annotations
 import ctypes
 import threading
 import time
-from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any
 
 from chaic._chaic import Briefing, Observation
@@ -28,7 +27,7 @@ def _raise_in(thread: int, error: type[BaseException] | None) -> None:
 
 
 class Watchdog:
-    """Ends calls that exceed the time limit inside ``limit``, which then raises ``TimeoutError``.
+    """Ends calls that exceed the time limit; ``call`` then raises ``TimeoutError``.
 
     Python code can be stopped anywhere, a call into C (a sleep, a download, a matrix product) only when it returns.
     """
@@ -59,29 +58,30 @@ class Watchdog:
                     self._expired.add(thread)
                     _raise_in(thread, _TimeLimitExceeded)
 
-    @contextmanager
-    def limit(self, call: str) -> Generator[None]:
-        """Applies the time limit to this thread inside the context; ``call`` names the call in the error."""
+    def call(self, name: str, function: Callable[..., Any], *arguments: Any) -> Any:
+        """Calls a function in this thread with the time limit; ``name`` names the call in the error."""
         thread = threading.get_ident()
         with self._lock:
             self._expired.discard(thread)
             self._deadlines[thread] = time.monotonic() + self._limit_s
+        result: Any = None
         error: BaseException | None = None
-        try:
-            yield
-        except BaseException as raised:
-            error = raised
         # The exception may come anywhere until the deadline is gone.
         try:
+            try:
+                result = function(*arguments)
+            except BaseException as raised:
+                error = raised
             is_expired = self._end(thread)
         except _TimeLimitExceeded:
             is_expired = self._end(thread)
         if is_expired:
-            problem = TimeoutError(f"{call} took longer than {self._limit_s:g} s")
+            problem = TimeoutError(f"{name} took longer than {self._limit_s:g} s")
             # The traceback shows where the call was.
             raise problem.with_traceback(None if error is None else error.__traceback__) from None
         if error is not None:
             raise error
+        return result
 
     def _end(self, thread: int) -> bool:
         """Ends the current call of a thread; returns whether it has exceeded the limit."""
@@ -100,15 +100,12 @@ class TimeLimitedHelper:
 
     def __init__(self, maker: Callable[[], Any], watchdog: Watchdog) -> None:
         self._watchdog = watchdog
-        with watchdog.limit("the creation of the helper"):
-            self._helper = maker()
+        self._helper = watchdog.call("the creation of the helper", maker)
 
     def reset(self, briefing: Briefing) -> None:
         """Starts an episode."""
-        with self._watchdog.limit("reset"):
-            self._helper.reset(briefing)
+        self._watchdog.call("reset", self._helper.reset, briefing)
 
     def act(self, observation: Observation) -> Any:
         """Returns the next action of the helper."""
-        with self._watchdog.limit("act"):
-            return self._helper.act(observation)
+        return self._watchdog.call("act", self._helper.act, observation)

@@ -292,8 +292,12 @@ def test_a_view_is_that_of_the_helper_or_of_a_camera(episode):
     world = waiting(episode)
     assert (world.render()["rgb"] == world.render(1)["rgb"]).all()
     assert (world.render()["rgb"] != world.render(0)["rgb"]).any()
+    camera = world.observe().camera
     with pytest.raises(ValueError, match="agent or a camera"):
-        world.render(0, camera=world.observe().camera)
+        world.render(0, camera=camera)
+    alone = chaic.World(episode, helper="none")
+    assert (alone.render()["rgb"] == alone.render(0)["rgb"]).all()
+    assert alone.render(camera=camera)["rgb"].any()
 
 
 def test_the_detector_finds_objects_in_an_image(episode):
@@ -318,6 +322,8 @@ def test_old_names_warn_or_name_the_new_one(episode):
         (world.observe(), "own", "proprioception"),
         (world, "own", "proprioception"),
         (world, "plan", "floor_plan"),
+        (episode, "plan", "floor_plan"),
+        (chaic.Batch([episode], [0], **OPTIONS), "own", "proprioception"),
         (chaic.Planner(), "attend", "act"),
         (chaic.Planner(), "things", "remembered_objects"),
         (world.observe(), "film", "frame_history"),

@@ -136,7 +136,8 @@ pub struct PlannerRules {
     /// True if agents see that an object is in another agent's hands.
     #[serde(alias = "sees_holding")]
     pub sees_held_objects: bool,
-    /// True if partner and rule-based helpers know what the other holds while it is in view.
+    /// True if partner and rule-based helpers know actions, outcomes and held objects of the other while
+    /// it is in view.
     #[serde(alias = "knows_holding")]
     pub knows_partner_behavior: bool,
     /// True if rule-based helpers perceive people at all. The original's detector has no class for

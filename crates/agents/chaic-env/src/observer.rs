@@ -167,6 +167,9 @@ impl ObservationRenderer {
             ids.resize(view.camera.width as usize * view.camera.height as usize, 0);
             let images = ImagesMut { rgb, depth_m, ids: Some(&mut ids) };
             self.scene.render_view_into(world, &view, images);
+        } else {
+            // The ids of an action at a pixel may be left from an earlier turn.
+            ids.clear();
         }
         if let Some(out) = ids_out {
             out.copy_from_slice(&ids);

@@ -97,6 +97,18 @@ impl RuleSet {
         Ok(changed)
     }
 
+    /// Returns the set with one rule changed as [`RuleSet::with`] does. The rule may have the name of an
+    /// earlier version, as in recorded options.
+    ///
+    /// # Errors
+    /// Those of [`RuleSet::with`].
+    pub fn with_recorded(self, setting: &str) -> Result<RuleSet> {
+        let renamed = setting.split_once('=').and_then(|(name, value)| {
+            renamed::current_name(name).map(|name| format!("{name}={value}"))
+        });
+        self.with(renamed.as_deref().unwrap_or(setting))
+    }
+
     /// Checks the lengths of a turn and of a step, by which planners divide, and all durations.
     ///
     /// # Errors

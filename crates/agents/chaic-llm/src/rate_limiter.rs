@@ -126,7 +126,7 @@ impl RateLimiter {
         [
             (max_requests.is_some_and(|n| spent.requests >= n), "requests"),
             (max_tokens.is_some_and(|n| spent.tokens >= n), "tokens"),
-            (max_cost.is_some_and(|n| spent.cost >= n), "cost"),
+            (max_cost.is_some_and(|n| spent.cost >= n), "money"),
             (max_minutes.is_some_and(|n| minutes_passed >= n), "minutes"),
         ]
         .into_iter()

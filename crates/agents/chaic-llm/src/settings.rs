@@ -399,6 +399,23 @@ mod tests {
     }
 
     #[test]
+    fn keys_of_earlier_versions_are_read() {
+        let old = "[asking]\nmodel = \"m\"\nform = \"text\"\nanswer_tokens = 64\nanswer_tokens_field = \"n\"\n\
+                   prompt_tokens = 900\nomit = [\"seed\"]\nbehavior = \"track\"\n[endpoint]\nin_flight = 3\n\
+                   [faults]\nattempts = 2\nfirst_wait_secs = 0.5\nlongest_wait_secs = 2.0\nthen = \"fallback\"\n\
+                   [budget]\nrequests = 5\ntokens = 6\nmoney = 7.0\nminutes = 8.0\nthen = \"fallback\"\n";
+        let new = "[request]\nmodel = \"m\"\nanswer_format = \"text\"\nmax_answer_tokens = 64\n\
+                   max_tokens_field = \"n\"\nmax_prompt_tokens = 900\nomit_fields = [\"seed\"]\n\
+                   behavior = \"perceived\"\n[endpoint]\nmax_concurrent_requests = 3\n\
+                   [retry]\nmax_attempts = 2\ninitial_backoff_secs = 0.5\nmax_backoff_secs = 2.0\n\
+                   on_failure = \"fallback\"\n[budget]\nmax_requests = 5\nmax_tokens = 6\nmax_cost = 7.0\n\
+                   max_minutes = 8.0\non_exhausted = \"fallback\"\n";
+        let settings = toml::from_str::<Settings>(new).unwrap();
+        assert_eq!(toml::from_str::<Settings>(old).unwrap(), settings);
+        assert_eq!(settings.retry.on_failure, FailureAction::Fallback);
+    }
+
+    #[test]
     fn missing_fields_have_defaults_and_unknown_fields_are_refused() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("llm.toml");

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use crate::action;
 use crate::episode::Episode;
-use crate::error::{failure, from_env, mistake, no_such, poisoned};
+use crate::error::{failure, from_env, mistake, no_attribute, no_such, poisoned};
 use crate::observation::Briefing;
 use crate::options::Options;
 use crate::reward::parse_weights;
@@ -310,6 +310,11 @@ impl Batch {
             return Err(no_such("agent", usize::from(agent), n));
         }
         Ok(Briefing(env.briefing(AgentId(agent))))
+    }
+
+    /// Raises `AttributeError`; the message names the new name of a renamed method.
+    fn __getattr__(&self, name: &str) -> PyResult<Py<PyAny>> {
+        Err(no_attribute("Batch", name, &[("own", "proprioception")]))
     }
 
     /// Returns the digest of the state of a world.

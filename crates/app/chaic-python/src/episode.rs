@@ -15,7 +15,7 @@ use numpy::{
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
-use crate::error::{failure, mistake};
+use crate::error::{failure, mistake, no_attribute};
 
 /// An episode: a scene, its objects and people, and the partner's goal.
 #[pyclass(frozen, module = "chaic._chaic", skip_from_py_object)]
@@ -82,6 +82,11 @@ impl Episode {
     fn from_dict(py: Python<'_>, fields: &Bound<'_, PyDict>) -> PyResult<Episode> {
         let text: String = py.import("json")?.call_method1("dumps", (fields,))?.extract()?;
         Episode::from_json(py, &text)
+    }
+
+    /// Raises `AttributeError`; the message names the new name of a renamed method.
+    fn __getattr__(&self, name: &str) -> PyResult<Py<PyAny>> {
+        Err(no_attribute("Episode", name, &[("plan", "floor_plan")]))
     }
 
     /// Shows the top view in the notebook or the browser.

@@ -57,7 +57,7 @@ impl IsolatedHelper {
         };
         let decision = Duration::try_from_secs_f64(options.decision_s).map_err(mistake)?;
         let default = Limits::default();
-        // The limit applies to each call, as for helpers in this process.
+        // The limit applies to each action, as for helpers in this process. Processes have more time to start.
         let start = default.start.max(decision);
         let limits = Limits { start, decision, episode: Duration::MAX, ..default };
         let create = |(name, line): (&String, &String)| {

@@ -280,8 +280,8 @@ impl World {
         Ok(())
     }
 
-    /// Renders the view of an agent, by default the helper, or of a camera (a dictionary as `Observation.camera`).
-    /// Returns arrays by name: `rgb`, `depth`, `ids`. The method ignores grants; agents use `observe`.
+    /// Renders the view of an agent, by default the helper if there is one, or of a camera (a dictionary as
+    /// `Observation.camera`). Returns arrays by name: `rgb`, `depth`, `ids`. The method ignores grants; agents use `observe`.
     #[pyo3(signature = (agent=None, camera=None, image_size=512, images=None))]
     fn render<'py>(
         &mut self,
@@ -297,7 +297,9 @@ impl World {
         if agent.is_some() && camera.is_some() {
             return Err(mistake("give an agent or a camera"));
         }
-        let id = self.agent(agent.unwrap_or(AgentId::HELPER.0))?;
+        let has_helper = self.env()?.slots().len() > AgentId::HELPER.index();
+        let default = if has_helper { AgentId::HELPER } else { AgentId::PARTNER };
+        let id = self.agent(agent.unwrap_or(default.0))?;
         let env = self.env()?;
         let view = match camera {
             Some(camera) => {

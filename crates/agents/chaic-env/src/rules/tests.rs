@@ -60,6 +60,10 @@ fn earlier_names_of_rules_are_read_and_refused_with_the_current_ones() {
     assert_eq!(serde_json::from_value::<RuleSet>(earlier).unwrap(), RuleSet::COMPAT);
     let error = RuleSet::PAPER.with("planner.limits.wait_frames=3").unwrap_err().to_string();
     assert!(error.contains("`planner.plan_timeouts.wait_frames`"), "{error}");
+    for setting in ["planner.limits.wait_frames=3", "planner.plan_timeouts.wait_frames=3"] {
+        let rules = RuleSet::PAPER.with_recorded(setting).unwrap();
+        assert_eq!(rules.planner.plan_timeouts.wait_frames, 3);
+    }
 }
 
 #[test]

@@ -243,3 +243,27 @@ fn different_sensors_wrong_buffers_and_unknown_environments_are_refused() {
     batch.restore(0, &snapshot).unwrap();
     assert_eq!(batch.envs()[0].world().state().frame, 0);
 }
+
+#[test]
+fn agents_without_images_observe_the_same_in_a_batch_and_alone() {
+    let bundled = bundled();
+    let sensors = SensorConfig { rgb: false, depth: false, ids: false, ..ALL };
+    let new_env = || env(&bundled, 0, Grants::PLANNER, sensors);
+    let (mut alone, mut batch) = (new_env(), EnvBatch::new(vec![new_env()]).unwrap());
+    let pixel = Target::Pixel { column: SIZE / 2, row: SIZE / 2 };
+    for k in 0..8 {
+        alone.advance(None).unwrap();
+        batch.advance(None);
+        batch.observe(ImagesMut::default()).unwrap();
+        let expected = alone.observe(AgentId::HELPER).unwrap();
+        let found = batch.observation(0).unwrap();
+        assert_eq!(format!("{found:?}"), format!("{expected:?}"), "decision {k}");
+        // The ids that resolve the pixel are not part of the next observation.
+        let action = match k % 2 {
+            0 => Action::PickUp { object: pixel, hand: Hand::Left },
+            _ => Action::TurnLeft,
+        };
+        assert!(alone.submit(AgentId::HELPER, action) && batch.submit(0, action));
+    }
+    assert_eq!(alone.digest(), batch.envs()[0].digest());
+}

@@ -16,7 +16,7 @@ pub(super) type CommandExamples = (&'static str, [Example; 3]);
 const ROOT: &[CommandExamples] = &[(
     "chaic",
     [
-        ("Play a small benchmark, about half a minute", "chaic eval"),
+        ("Play a small benchmark, about a minute", "chaic eval"),
         ("Print its scores", "chaic report runs/quick"),
         ("Check this machine", "chaic doctor"),
     ],

@@ -22,7 +22,7 @@ use crate::arguments::{EvalArguments, ExecArguments, HelperArgument};
 use crate::interrupt;
 use crate::output::{counted, print_error, print_progress, print_warning, quoted, quoted_path};
 
-/// Episodes of each task in the small benchmark: with all helpers about half a minute on two cores.
+/// Episodes of each task in the small benchmark: with all helpers about a minute on two cores.
 const QUICK_EPISODES: u32 = 2;
 
 /// State that all runs of one command share.

@@ -133,7 +133,8 @@ impl RunOptions {
     /// If an override names an unknown rule or an invalid value.
     pub fn rules(&self) -> Result<RuleSet> {
         let named = RuleSet::named(self.rules);
-        Ok(self.rule_overrides.iter().try_fold(named, |rules, setting| rules.with(setting))?)
+        let mut overrides = self.rule_overrides.iter();
+        Ok(overrides.try_fold(named, |rules, setting| rules.with_recorded(setting))?)
     }
 
     /// Returns the digest of all options as compact JSON.

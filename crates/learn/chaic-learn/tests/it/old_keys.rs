@@ -31,7 +31,10 @@ fn old_keys_are_read_and_conflicting_and_unknown_keys_are_refused() {
         ],
     );
     check_renamed_keys::<Ppo>("[ppo.adam]\n", &[("clip_norm", "max_grad_norm", "2.0")]);
-    check_renamed_keys::<Ppo>("[rollout]\n", &[]);
+    check_renamed_keys::<Ppo>(
+        "[rollout]\n",
+        &[("proposals", "infer_hint", "true"), ("memory", "n_past_decisions", "2")],
+    );
     check_renamed_keys::<Ppo>(
         "[rollout.rewards]\n",
         &[
@@ -44,6 +47,7 @@ fn old_keys_are_read_and_conflicting_and_unknown_keys_are_refused() {
         "",
         &[
             PLAY,
+            ("teacher", "expert", "{ helper = \"rhp\" }"),
             ("mixed", "learner_fraction", "0.25"),
             ("discount", "gamma", "0.5"),
             ("batch", "batch_size", "32"),

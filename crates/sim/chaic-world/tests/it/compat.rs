@@ -153,14 +153,14 @@ fn after_a_failed_put(rules: Rules) -> World {
 }
 
 #[test]
-fn a_drop_near_the_goal_after_a_failed_put_counts_under_dropped_counts() {
+fn a_drop_near_the_goal_after_a_failed_put_on_can_deliver() {
     assert!(after_a_failed_put(PAPER).delivered().is_empty());
     let w = after_a_failed_put(Rules { failed_put_on_can_deliver: true, ..PAPER });
     assert_eq!(w.delivered(), vec![nth(0)]);
 }
 
 #[test]
-fn a_put_on_anywhere_delivers_only_under_delivered_anywhere() {
+fn a_put_on_anywhere_delivers_only_under_its_rule() {
     let delivered = |rules| {
         let things =
             vec![thing("apple", at(0.0, 0.0, -0.5)), thing("dining_table", at(1.5, 0.0, 0.0))];
@@ -175,7 +175,7 @@ fn a_put_on_anywhere_delivers_only_under_delivered_anywhere() {
 }
 
 #[test]
-fn a_failed_put_on_delivers_with_a_successful_one_under_delivered_anywhere() {
+fn a_failed_put_on_delivers_with_a_successful_one_under_its_rule() {
     // Attempts with the left and the right hand, each at a table within or above the reach.
     let delivered = |succeed: [bool; 2], put_on_delivers_all_released| {
         let tables = [(1.2, 0.0), (-1.2, 2.0)].map(|(x, bottom)| {
@@ -315,7 +315,7 @@ fn refused_pick_and_raise_furniture_take_the_original_frames() {
 }
 
 #[test]
-fn removed_obstacles_are_announced_under_tells_removed() {
+fn removed_obstacles_are_announced_under_their_rule() {
     let announced = |announces_removed_obstacles| {
         let bin = thing("trashbin", at(0.0, 0.0, -0.8));
         let setup = hall(vec![bin], vec![person(Persona::Helper, 0.0, 0.0)]);

@@ -185,7 +185,8 @@ class World:
         images: Sequence[str] | None = None,
     ) -> dict[str, NDArray[Any]]:
         """Renders the view of an agent, by default the helper if there is one, or of a camera (a dictionary as
-        `Observation.camera`). Returns arrays by name: `rgb`, `depth`, `ids`. The method ignores grants; agents use `observe`."""
+        `Observation.camera`). Returns arrays by name: `rgb`, `depth`, `ids`. The method ignores grants; agents use
+        `observe`."""
     def floor_plan(self, width: int = 640) -> NDArray[np.uint8]:
         """Draws the top view, uint8 [height, width, 3]."""
     def show(self) -> None:

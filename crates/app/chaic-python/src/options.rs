@@ -145,7 +145,7 @@ impl Options {
     }
 }
 
-/// Returns a rule set with changes such as `planner.max_failed_lifts=2`.
+/// Returns a rule set with changes such as `world.stride_m=0.5`.
 ///
 /// # Errors
 /// `ValueError` for an unknown rule set or an invalid change.

@@ -2,11 +2,11 @@
 
 use std::sync::{Arc, Mutex};
 
+use chaic_agents::PlanningAgent as CorePlanningAgent;
 use chaic_agents::decision::Plan;
 use chaic_agents::memory::Memory;
 use chaic_agents::memory::egocentric::{CHANNELS, EgocentricMap};
 use chaic_agents::policies::ExternalPolicy;
-use chaic_agents::{PlannerRules, PlanningAgent as CorePlanningAgent};
 use chaic_core::geom::rotate_yaw;
 use chaic_core::observation::{Grants, SensorConfig};
 use chaic_core::{Agent, AgentError};
@@ -22,14 +22,6 @@ use crate::action::to_object;
 use crate::error::{failure, from_env, mistake, no_attribute, no_such, poisoned};
 use crate::observation::{Briefing, Observation, plain};
 use crate::options::{perception, rule_set, sensors};
-
-/// Returns the planner rules of a rule set with changes.
-///
-/// # Errors
-/// `ValueError` for an unknown rule set or an invalid change.
-fn planner_rules(rules: &str, set: &[String]) -> PyResult<PlannerRules> {
-    Ok(rule_set(rules, set)?.planner)
-}
 
 /// Refuses behavior recognition from images: the worlds of this package record no frame history for it.
 fn check_history(sensors: SensorConfig) -> PyResult<()> {
@@ -77,7 +69,7 @@ impl PlanningAgent {
         let perception = self::perception(perception, behavior)?;
         let built_in = BuiltInWithPerception { perception: Arc::clone(&perception) };
         let helpers = PolicyRegistry::bundled(&built_in, perception);
-        let rules = planner_rules(rules, &set)?;
+        let rules = rule_set(rules, &set)?.planner;
         let found = helper_registry::find(&helpers, name, rules).map_err(|e| from_env(&e))?;
         let Some(Helper { agent, grants }) = found else {
             return Err(mistake("\"none\" is not a helper"));
@@ -207,7 +199,7 @@ impl Planner {
         sensors(&[], image_size)?;
         perception.check_image_size(image_size).map_err(mistake)?;
         let policy = ExternalPolicy::default();
-        let rules = planner_rules(rules, &set)?;
+        let rules = rule_set(rules, &set)?.planner;
         let agent = CorePlanningAgent::with_perception(policy, rules, &*perception);
         check_history(agent.sensors())?;
         let sensors = SensorConfig { image_size, ..agent.sensors() };

@@ -281,7 +281,8 @@ impl World {
     }
 
     /// Renders the view of an agent, by default the helper if there is one, or of a camera (a dictionary as
-    /// `Observation.camera`). Returns arrays by name: `rgb`, `depth`, `ids`. The method ignores grants; agents use `observe`.
+    /// `Observation.camera`). Returns arrays by name: `rgb`, `depth`, `ids`. The method ignores grants; agents use
+    /// `observe`.
     #[pyo3(signature = (agent=None, camera=None, image_size=512, images=None))]
     fn render<'py>(
         &mut self,

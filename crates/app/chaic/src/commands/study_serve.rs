@@ -138,7 +138,7 @@ mod own_helpers {
         Ok(Box::leak(Box::new(CommandRegistry::new(policies, programs, stop)?)))
     }
 
-    /// Tells how the server gets a helper that it lacks.
+    /// Adds to the error of a missing helper how to give one.
     pub(super) fn with_hint(error: ServerError) -> anyhow::Error {
         match error {
             ServerError::Helper(problem) => {

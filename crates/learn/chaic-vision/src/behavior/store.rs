@@ -229,17 +229,19 @@ mod tests {
         Clip { label, is_mixed: label == Behavior::Moving, crops }
     }
 
+    fn open(
+        folder: &Path,
+        split: DatasetSplit,
+        config: &ClipCollectionConfig,
+    ) -> Result<ClipFolder, StoreError> {
+        ClipFolder::open(folder, split, config, &GroundTruthPerceptionFactory)
+    }
+
     #[test]
     fn clips_are_read_as_they_were_written() {
         let dir = tempfile::tempdir().unwrap();
         let config = ClipCollectionConfig::default();
-        let folder = ClipFolder::open(
-            dir.path(),
-            DatasetSplit::Train,
-            &config,
-            &GroundTruthPerceptionFactory,
-        )
-        .unwrap();
+        let folder = open(dir.path(), DatasetSplit::Train, &config).unwrap();
         let clips = vec![clip(Behavior::PutIn, 5), clip(Behavior::Moving, 90)];
         folder.write(16, &clips).unwrap();
         assert!(folder.read(16).unwrap() == Some(clips));
@@ -252,13 +254,11 @@ mod tests {
     fn clips_of_another_perception_are_refused() {
         let dir = tempfile::tempdir().unwrap();
         let config = ClipCollectionConfig::default();
-        let open = |perception: &dyn PerceptionFactory| {
-            ClipFolder::open(dir.path(), DatasetSplit::Train, &config, perception)
-        };
-        open(&GroundTruthPerceptionFactory).unwrap();
+        open(dir.path(), DatasetSplit::Train, &config).unwrap();
         let noisy = perception_from_name("noisy", GROUND_TRUTH).unwrap();
-        assert!(matches!(open(&*noisy), Err(StoreError::Config(_))));
-        open(&GroundTruthPerceptionFactory).unwrap();
+        let opened = ClipFolder::open(dir.path(), DatasetSplit::Train, &config, &*noisy);
+        assert!(matches!(opened, Err(StoreError::Config(_))));
+        open(dir.path(), DatasetSplit::Train, &config).unwrap();
     }
 
     #[test]
@@ -268,48 +268,19 @@ mod tests {
                     varied = 0.35\nlearned = 0.0\n";
         fs::write(dir.path().join(CONFIG), text).unwrap();
         let config = ClipCollectionConfig::default();
-        ClipFolder::open(dir.path(), DatasetSplit::Train, &config, &GroundTruthPerceptionFactory)
-            .unwrap();
-        assert!(
-            ClipFolder::open(
-                dir.path(),
-                DatasetSplit::Validation,
-                &config,
-                &GroundTruthPerceptionFactory
-            )
-            .is_err()
-        );
+        open(dir.path(), DatasetSplit::Train, &config).unwrap();
+        assert!(open(dir.path(), DatasetSplit::Validation, &config).is_err());
     }
 
     #[test]
     fn other_configurations_and_damaged_files_are_refused() {
         let dir = tempfile::tempdir().unwrap();
         let config = ClipCollectionConfig::default();
-        let folder = ClipFolder::open(
-            dir.path(),
-            DatasetSplit::Train,
-            &config,
-            &GroundTruthPerceptionFactory,
-        )
-        .unwrap();
+        let folder = open(dir.path(), DatasetSplit::Train, &config).unwrap();
         let other_config = ClipCollectionConfig { seed: 2, ..config };
-        let refused = ClipFolder::open(
-            dir.path(),
-            DatasetSplit::Train,
-            &other_config,
-            &GroundTruthPerceptionFactory,
-        )
-        .unwrap_err();
+        let refused = open(dir.path(), DatasetSplit::Train, &other_config).unwrap_err();
         assert!(refused.to_string().contains("of another configuration"), "{refused}");
-        assert!(
-            ClipFolder::open(
-                dir.path(),
-                DatasetSplit::Test,
-                &config,
-                &GroundTruthPerceptionFactory
-            )
-            .is_err()
-        );
+        assert!(open(dir.path(), DatasetSplit::Test, &config).is_err());
         let bytes = to_bytes(&[clip(Behavior::PutOn, 0)]);
         for length in [0, 7, 100, bytes.len() - 1] {
             fs::write(folder.path(0), &bytes[..length]).unwrap();

@@ -10,7 +10,7 @@ import numpy as np
 
 @dataclass
 class Mesh:
-    """Triangles of one color, in the object's frame, metres, y up."""
+    """Triangles of one color, in the object's frame, meters, y up."""
 
     positions: np.ndarray  # float32 [n, 3]
     normals: np.ndarray  # float32 [n, 3]
@@ -25,7 +25,7 @@ class Part:
     mesh: int  # index in Scene.meshes
     color: tuple  # linear red, green, blue, 0 to 1
     rotation: tuple  # quaternion x, y, z, w
-    origin: tuple  # metres
+    origin: tuple  # meters
 
     @property
     def srgb(self):

@@ -10,8 +10,8 @@ import random
 
 from chaic_helper import serve
 
-NEAR_M = 1.2  # Distance from which it picks up or puts on, metres.
-BLOCKED_M = 0.6  # Depth ahead below which the path is blocked, metres.
+NEAR_M = 1.2  # Distance from which it picks up or puts on, meters.
+BLOCKED_M = 0.6  # Depth ahead below which the path is blocked, meters.
 SIZE = 64  # Requested image size, pixels; `chaic eval --size` overrides it.
 
 
@@ -59,13 +59,13 @@ class Walker:
         return "move_forward"
 
     def ahead_m(self, images):
-        """Returns the smallest depth in the center of the image, metres."""
+        """Returns the smallest depth in the center of the image, meters."""
         size = self.size
         middle = range(size // 2 - size // 16, size // 2 + size // 16)
         return min(images.depth_m[size * row + column] for row in middle for column in middle)
 
     def nearest(self, observation, images, wanted, hands):
-        """Returns distance (metres), pixel and id of the nearest visible object of a wanted class."""
+        """Returns distance (meters), pixel and id of the nearest visible object of a wanted class."""
         held = {hand["identity"]["entity"] for hand in hands if hand["identity"]}
         classes = dict(observation["granted"]["classes"])
         ids = {e for e, c in classes.items() if c in wanted and e not in held | self.given_up}

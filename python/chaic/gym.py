@@ -46,7 +46,7 @@ class HelperEnv(gymnasium.Env[Any, Any]):
     """Environment of one helper and the simulated partner of a task.
 
     - ``task``: a task, several, or ``None`` for the paper's eight.
-    - ``observation``: any of ``rgb`` (uint8), ``depth`` (float32 metres), ``proprioception``
+    - ``observation``: any of ``rgb`` (uint8), ``depth`` (float32 meters), ``proprioception``
       (``chaic.PROPRIOCEPTION``), ``map`` (egocentric map of the memory, ``chaic.MAP``), and ``ids`` (needs the grant).
     - ``action``: ``"primitive"`` is a kind of action and a pixel. ``"plan"`` is the index of an offered plan
       (``observation["plans"]``, ``info["action_mask"]``), which chaic's planner executes.

@@ -25,7 +25,7 @@ def camera(
     width: int = 512,
     height: int = 512,
 ) -> dict[str, Any]:
-    """Returns a pinhole camera for ``World.render``. ``eye`` and ``look_at`` are points in the world, metres, y up.
+    """Returns a pinhole camera for ``World.render``. ``eye`` and ``look_at`` are points in the world, meters, y up.
 
     Raises ``ValueError`` if the viewing direction is undefined or vertical.
     """

@@ -17,14 +17,14 @@ PARTS = ("rgb", "depth", "ids", "proprioception", "map")
 #: Default parts.
 DEFAULT_PARTS = ("rgb", "depth", "proprioception")
 
-#: Maximum depth, metres; also the depth of a pixel without a surface.
+#: Maximum depth, meters; also the depth of a pixel without a surface.
 MAX_DEPTH_M = 100.0
-#: Bound of positions relative to the origin of the world or to a body, metres.
+#: Bound of positions relative to the origin of the world or to a body, meters.
 MAX_COORDINATE_M = 1000.0
 #: Maximum number of offered plans; further ones are dropped. Those of the standard split are at most 52: a target for each of
 #: 33 objects, six containers, seven obstacles, and six plans without an object.
 MAX_PLANS = 64
-#: Semantic map: cells along each side, and the size of a cell, metres.
+#: Semantic map: cells along each side, and the size of a cell, meters.
 MAP_SIDE = 64
 MAP_CELL_M = 0.25
 

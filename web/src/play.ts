@@ -194,6 +194,7 @@ export class ChaicPlay extends LitElement {
 
   private show(shown: LiveState): void {
     const isNewTurn = shown.status === "waiting" && this.shown?.status !== "waiting";
+    const isPlanFocused = this.shadowRoot?.activeElement?.closest(".plans") != null;
     // A plan stays where it is while the list changes in a live game.
     const kept = isNewTurn ? [] : (this.shown?.plans ?? []).filter((plan) => shown.plans.includes(plan));
     const added = shown.plans.filter((plan) => !kept.includes(plan));
@@ -204,7 +205,10 @@ export class ChaicPlay extends LitElement {
       this.recordedFrame = shown.frame;
       this.requestTrace();
     }
-    if (isNewTurn) void this.updateComplete.then(() => this.focusChoices());
+    void this.updateComplete.then(() => {
+      // The focused plan may have left the list.
+      if (isNewTurn || (isPlanFocused && !this.shadowRoot?.activeElement)) this.focusChoices();
+    });
   }
 
   /** Moves the focus to the first plan, unless the person is elsewhere on the page. */

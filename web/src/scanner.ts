@@ -29,6 +29,8 @@ export class Scanner {
     const change = (event: Event): void => {
       this.seconds = Number((event.target as HTMLSelectElement).value);
       this.set(this.isOn);
+      // A person with one switch cannot move the focus away.
+      (event.target as HTMLSelectElement).blur();
     };
     return html`<label>
         <input type="checkbox" class="scan" .checked=${this.isOn} @change=${toggle} />

@@ -203,16 +203,19 @@ export class ChaicStudy extends LitElement {
     this.entering = { log, participant };
     this.waits = "entry";
     const entry = await participant.enter();
-    if (entry === "aborted") return;
-    this.entering = undefined;
+    if (entry === "aborted" || this.hasLeft) return;
     if (entry === "taken") {
       await this.enter(log);
     } else if (entry === "full") {
+      this.entering = undefined;
       await log.delete();
       this.waits = "full";
       this.focusHeading();
     } else if (entry.start.type === "start" && this.takeSlot(entry.start.slot)) {
       await log.append(entry.start);
+      // "Stop and delete" during this has deleted the record as well.
+      if (this.hasLeft) return;
+      this.entering = undefined;
       this.waits = undefined;
       this.log = log;
       this.startUpload(log, participant, entry.stored);
@@ -330,7 +333,10 @@ export class ChaicStudy extends LitElement {
 
   /** Saves the data. Those with traces are on the server if it simulates. */
   private async download(): Promise<void> {
-    const file = this.isSimulatedByServer() ? await this.participant?.data() : this.log?.toText();
+    // The server refuses the file before it has the last record.
+    const file = this.isSimulatedByServer()
+      ? await this.participant?.data().catch(() => undefined)
+      : this.log?.toText();
     this.hasDownloadFailed = file === undefined;
     if (file === undefined) return;
     const link = document.createElement("a");
@@ -535,7 +541,7 @@ export class ChaicStudy extends LitElement {
       <p>
         <button type="button" @click=${() => void this.download()}>Download your data</button>
       </p>
-      <p role="status">${this.hasDownloadFailed ? "There is no connection to the server. Try again later." : ""}</p>
+      <p role="status">${this.hasDownloadFailed ? "The server does not send the file now. Try again later." : ""}</p>
       <p class="small">The file has your answers and your decisions. It has no name, no address and no times of day.
         "Stop and delete" removes ${content.server ? "all your data, also on the server" : "the copy in this browser"}.</p>
       ${this.upload ? this.uploaded(this.upload) : nothing}`;
@@ -545,7 +551,10 @@ export class ChaicStudy extends LitElement {
   private uploaded({ state }: Upload): TemplateResult {
     if (state !== "saved") {
       return html`<p role="status">The server does not have all your data yet. Keep this page open, or open it again
-        later. If that does not help, download your data and send them to the researchers.</p>`;
+        later.
+        ${this.isSimulatedByServer()
+          ? nothing
+          : "If that does not help, download your data and send them to the researchers."}</p>`;
     }
     return html`<p role="status">The server has all your data. You may close this page.</p>
       <p><button type="button" @click=${() => void this.removeCopy()}>Remove the copy in this browser</button></p>`;

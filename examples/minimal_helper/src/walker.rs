@@ -11,9 +11,9 @@ use chaic_core::{
     Vec3,
 };
 
-/// Distance from which it picks up or puts on, metres.
+/// Distance from which it picks up or puts on, meters.
 const NEAR_M: f32 = 1.3;
-/// Depth straight ahead below which the path is blocked, metres.
+/// Depth straight ahead below which the path is blocked, meters.
 const BLOCKED_M: f32 = 0.6;
 
 /// State of one episode.
@@ -103,7 +103,7 @@ fn nearest(
     means.min_by(|a, b| horizontal_distance(a.1, here).total_cmp(&horizontal_distance(b.1, here)))
 }
 
-/// Depth of the central pixel, metres.
+/// Depth of the central pixel, meters.
 fn depth_ahead_m(seen: &Observation) -> f32 {
     let middle = (seen.camera.height / 2 * seen.camera.width + seen.camera.width / 2) as usize;
     seen.images.depth_m.as_ref().map_or(f32::INFINITY, |d| d[middle])

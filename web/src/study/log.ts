@@ -79,7 +79,13 @@ export class StudyLog {
   /** Appends a record; resolves when the browser has stored it. */
   async append(record: DataRecord): Promise<void> {
     this.records.push(record);
-    await this.change(STORE, (store) => store.add(record));
+    try {
+      await this.change(STORE, (store) => store.add(record));
+    } catch (problem) {
+      // The numbers of later records stay those of the database.
+      this.records.splice(this.records.indexOf(record), 1);
+      throw problem;
+    }
     this.nStored += 1;
   }
 

@@ -216,6 +216,9 @@ mod tests {
             assert!(check(perception, behavior).unwrap_err().contains("hidden track needs"));
         }
         assert_eq!(Track::Unrestricted.check_perception(None, None), Ok(()));
+        assert_eq!(Track::Unrestricted.perception_or(None), None);
+        assert_eq!(Track::Hidden.perception_or(None).as_deref(), Some("learned"));
+        assert_eq!(Track::Hidden.perception_or(Some("mine".into())).as_deref(), Some("mine"));
     }
 
     #[test]

@@ -112,7 +112,7 @@ impl Question {
     /// asks for.
     fn find_wanted(&self, plans: &[&str]) -> Option<usize> {
         let line = |start: &str| self.text.lines().find_map(|l| l.trim().strip_prefix(start));
-        let taken = line("Has been seen to take: ").or_else(|| line("Wanted: "))?;
+        let taken = line("Picked up, as you saw: ").or_else(|| line("Wanted: "))?;
         let names: Vec<String> = taken
             .trim_end_matches('.')
             .split(", ")
@@ -125,7 +125,7 @@ impl Question {
     }
 
     fn knows_partner(&self) -> bool {
-        self.text.contains("Has been seen to take:") || self.text.contains("Wanted:")
+        self.text.contains("Picked up, as you saw:") || self.text.contains("Wanted:")
     }
 
     /// Returns the current frame and the number of frames from the prompt.
@@ -155,8 +155,8 @@ mod tests {
         let plans =
             "1. explore\n2. go to bread #30 and pick it up\n3. go to apple #31 and pick it up";
         for (before, number) in [
-            ("Has been seen to take: apple #7, apple #8.\n", 3),
-            ("Has been seen to take: pen #7.\n900 of 3000 frames have passed", 2),
+            ("Picked up, as you saw: apple #7, apple #8.\n", 3),
+            ("Picked up, as you saw: pen #7.\n900 of 3000 frames have passed", 2),
             ("Wanted: 3 apple, 2 pen.\n", 3),
         ] {
             let question = question(&format!("{before}\n{plans}"));

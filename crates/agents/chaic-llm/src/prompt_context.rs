@@ -33,7 +33,7 @@ pub const LENGTHS: [Length; 6] = [
     Length { interactions: 1, objects: 0, plans_per_kind: 4 },
 ];
 
-/// Variables of templates. Lengths in metres and coordinates are texts with one decimal.
+/// Variables of templates. Lengths in meters and coordinates are texts with one decimal.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PromptContext {
     /// Track of the prompt.
@@ -49,21 +49,21 @@ pub struct PromptContext {
     /// Capacity of a container or basket.
     pub capacity: u32,
     /// True if the targets are furniture.
-    pub moving: bool,
+    pub is_moving_house: bool,
     /// True if a child is present.
-    pub child: bool,
+    pub has_child: bool,
     /// True if the agent has a partner.
-    pub helped: bool,
+    pub has_partner: bool,
     /// Number of attached images.
-    pub images: usize,
+    pub n_images: usize,
     /// Time limit of the episode, frames.
     pub horizon: Frame,
-    /// Frames to walk ten metres.
+    /// Frames to walk ten meters.
     pub frames_per_10_m: u32,
     /// The agent's body.
     pub me: Body,
     /// Granted facts about the task.
-    pub told: Option<DisclosedFacts>,
+    pub disclosed: Option<DisclosedFacts>,
     /// Wanted objects; empty if not granted.
     pub wanted: Vec<Count>,
     /// Facts about the agent itself.
@@ -77,7 +77,7 @@ pub struct PromptContext {
     /// Valid plans, in the order of their numbers.
     pub plans: Vec<PlanFacts>,
     /// Number of omitted plans.
-    pub plans_left_out: usize,
+    pub n_omitted_plans: usize,
 }
 
 /// Description of a body.
@@ -90,9 +90,9 @@ pub struct Body {
     /// Maximum lifted mass, kilograms.
     pub strength_kg: u32,
     /// True if the person walks a bicycle.
-    pub docks: bool,
+    pub walks_bicycle: bool,
     /// True if the person uses a wheelchair.
-    pub rolls: bool,
+    pub uses_wheelchair: bool,
 }
 
 /// Granted facts about the task.
@@ -131,7 +131,7 @@ pub struct SelfFacts {
     /// Its interactions, oldest first.
     pub history: Vec<Interaction>,
     /// Number of omitted earlier interactions.
-    pub history_left_out: usize,
+    pub n_omitted_interactions: usize,
     /// Last plan.
     pub plan: Option<String>,
 }
@@ -142,7 +142,7 @@ pub struct Interaction {
     /// Frame.
     pub frame: Frame,
     /// Description.
-    pub what: String,
+    pub action: String,
     /// Outcome, if finished.
     pub outcome: Option<String>,
 }
@@ -151,9 +151,9 @@ pub struct Interaction {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PersonFacts {
     /// Relation to the agent.
-    pub who: &'static str,
+    pub name: &'static str,
     /// True if it was ever visible.
-    pub seen: bool,
+    pub was_seen: bool,
     /// True if it is visible.
     pub in_view: bool,
     /// Frames since it was last visible.
@@ -165,15 +165,15 @@ pub struct PersonFacts {
     /// Straight-line distance.
     pub distance_m: String,
     /// Distance of a lost child from the agent's partner.
-    pub away_m: Option<String>,
+    pub m_from_partner: Option<String>,
     /// Objects that it is known to have taken.
-    pub took: Vec<String>,
+    pub picked_up: Vec<String>,
     /// Last known held objects.
     pub holds: Vec<String>,
     /// Other observed interactions, oldest first.
     pub actions: Vec<Interaction>,
     /// Number of omitted earlier interactions.
-    pub actions_left_out: usize,
+    pub n_omitted_interactions: usize,
 }
 
 /// Task progress.
@@ -197,7 +197,7 @@ pub struct GoalPlace {
     /// Position, z.
     pub z: String,
     /// Path length.
-    pub way_m: String,
+    pub path_m: String,
     /// Estimated walking time, frames.
     pub frames: u32,
 }
@@ -206,9 +206,9 @@ pub struct GoalPlace {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Map {
     /// Relevant objects, nearest first.
-    pub things: Vec<ObjectFacts>,
+    pub objects: Vec<ObjectFacts>,
     /// Number of omitted farther objects.
-    pub left_out: usize,
+    pub n_omitted: usize,
     /// True if everything reachable is explored.
     pub explored: bool,
 }
@@ -236,7 +236,7 @@ pub struct PlanFacts {
     /// Plan in words.
     pub text: String,
     /// Path length to its object.
-    pub way_m: Option<String>,
+    pub path_m: Option<String>,
 }
 
 /// Sanitizes a name for a prompt: letters, digits and a few signs, on one line, with a maximum

@@ -131,7 +131,7 @@ impl Templates {
         for (title, name) in parts {
             text += &format!("## {title}\n{}\n\n", self.render(name, facts)?);
         }
-        if facts.images > 0 {
+        if facts.n_images > 0 {
             text += &format!("{}\n\n", self.render("images.txt", facts)?);
         }
         text += &self.render(ask, facts)?;
@@ -249,7 +249,7 @@ mod tests {
     fn template_errors_are_found_on_loading() {
         for (name, text, expected) in [
             ("map.txt", "one\n{{ nonsense }}", "map.txt: line 2"),
-            ("map.txt", "{% for x in map.things %}", "map.txt"),
+            ("map.txt", "{% for x in map.objects %}", "map.txt"),
             ("plan.txt", "x", "plans.txt"),
             (
                 "map.txt",

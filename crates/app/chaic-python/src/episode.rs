@@ -59,8 +59,8 @@ impl Episode {
     /// Draws the top view, uint8 [height, width, 3].
     #[pyo3(signature = (width=640))]
     fn floor_plan<'py>(&self, py: Python<'py>, width: u32) -> PyResult<Bound<'py, PyArray3<u8>>> {
-        if !(16..=8192).contains(&width) {
-            return Err(mistake(format!("width is {width}, expected 16 to 8192")));
+        if !(64..=8192).contains(&width) {
+            return Err(mistake(format!("width is {width}, expected 64 to 8192")));
         }
         let picture = py.detach(|| {
             let world = World::new(self.0.setup().clone(), RuleSet::PAPER.world)?;

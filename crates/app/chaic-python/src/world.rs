@@ -334,8 +334,8 @@ impl World {
         py: Python<'py>,
         width: u32,
     ) -> PyResult<Bound<'py, PyArray3<u8>>> {
-        if !(16..=8192).contains(&width) {
-            return Err(mistake(format!("width is {width}, expected 16 to 8192")));
+        if !(64..=8192).contains(&width) {
+            return Err(mistake(format!("width is {width}, expected 64 to 8192")));
         }
         let env = self.env()?;
         let (scene, world) = (env.renderer().scene(), env.world());

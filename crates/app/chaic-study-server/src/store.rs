@@ -329,14 +329,17 @@ impl Store {
         now_secs: u64,
     ) -> Option<u32> {
         let study = self.plan.study();
-        if by_code.len() >= study.participants as usize * PARTICIPANTS_PER_SLOT {
-            return None;
+        let mut n_by_slot: BTreeMap<u32, usize> = BTreeMap::new();
+        for participant in by_code.values() {
+            *n_by_slot.entry(participant.slot).or_default() += 1;
         }
         let timeout_secs = u64::from(study.timeout_minutes) * SECS_PER_MINUTE;
         let holders = by_code.values().map(|participant| SlotHolder {
             slot: participant.slot,
             since_secs: participant.since_secs,
-            is_complete: participant.is_complete.load(Ordering::Relaxed),
+            // A slot with the maximum number of participants is never free again.
+            is_complete: participant.is_complete.load(Ordering::Relaxed)
+                || n_by_slot[&participant.slot] >= PARTICIPANTS_PER_SLOT,
         });
         lowest_free_slot(study.participants, timeout_secs, now_secs, holders)
     }

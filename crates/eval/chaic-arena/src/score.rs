@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use chaic_agents::perception_factory::GROUND_TRUTH;
 use chaic_core::{Frame, TaskId};
 use chaic_env::helper_registry::RULES;
 use chaic_env::trace::MAX_TRACE_BYTES;
@@ -98,6 +99,10 @@ pub struct EvaluationConditions {
     pub person: Option<String>,
     /// Light and colors.
     pub appearance: String,
+    /// Perception of all helpers, also of the built-in ones for comparison.
+    pub perception: String,
+    /// Behavior recognition of all helpers.
+    pub behavior: String,
 }
 
 /// Result and digests of one episode run.
@@ -173,8 +178,8 @@ impl PlayedRun {
     }
 
     fn conditions(&self) -> EvaluationConditions {
-        let RunOptions { tasks, seeds, rules, rule_overrides, partner, person, appearance, .. } =
-            &self.options;
+        let RunOptions { tasks, seeds, rules, rule_overrides, .. } = &self.options;
+        let RunOptions { partner, person, appearance, perception, behavior, .. } = &self.options;
         let mut tasks = tasks.clone();
         tasks.sort_unstable();
         let first = self.episodes.first().map_or("", |episode| episode.id());
@@ -193,6 +198,8 @@ impl PlayedRun {
             partner: partner.clone().unwrap_or_else(|| RULES.to_owned()),
             person: person.map(|change| change.to_string()),
             appearance: appearance.clone().unwrap_or_else(|| Appearance::Canonical.to_string()),
+            perception: perception.clone().unwrap_or_else(|| GROUND_TRUTH.to_owned()),
+            behavior: behavior.clone().unwrap_or_else(|| GROUND_TRUTH.to_owned()),
         }
     }
 

@@ -139,8 +139,12 @@ impl EnvSetup {
     pub(super) fn episodes(&self) -> Result<Vec<Episode>> {
         let mut all = Vec::new();
         for task in &self.tasks {
+            let n_before = all.len();
             for episode in episodes(&Split::Train, *task) {
                 all.push(episode?);
+            }
+            if all.len() == n_before {
+                return Err(EvalError::Options(format!("{task} has no training episode")));
             }
         }
         let n_per_task = (all.len() / self.tasks.len().max(1)).max(1);

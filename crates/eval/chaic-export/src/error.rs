@@ -31,6 +31,9 @@ pub enum ExportError {
     /// The folder is not empty.
     #[error("{0} isn't empty; choose another --out")]
     NotEmpty(PathBuf),
+    /// The side of the images is odd.
+    #[error("images of {0} pixels cannot be a video; choose an even number")]
+    Size(u32),
     /// The sampling interval does not give a whole number of images per second.
     #[error(
         "an interval of {every} frames does not divide a second of {frames_per_s} frames; choose a divisor of {frames_per_s}"

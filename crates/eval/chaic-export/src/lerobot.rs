@@ -137,6 +137,10 @@ impl LeRobotWriter {
             let every = options.every;
             return Err(ExportError::Rate { every, frames_per_s: FRAMES_PER_S });
         }
+        // Videos have whole blocks of two by two pixels.
+        if !options.image_size.is_multiple_of(2) {
+            return Err(ExportError::Size(options.image_size));
+        }
         dataset_folder::create_empty(folder)?;
         Ok(LeRobotWriter {
             folder: folder.to_owned(),
@@ -537,14 +541,16 @@ fn encode_state(world: &World, agent: AgentId) -> [f32; STATE.len()] {
         });
         inside.count() as f32
     };
-    let heading = chaic_core::geom::forward(person.pose.yaw_rad);
+    // 0 looks along -z, positive turns left, as in the observations of environments.
+    let forward = chaic_core::geom::forward(person.pose.yaw_rad);
+    let (heading_sin, heading_cos) = (-forward.x, -forward.z);
     let time = state.frame as f32 / setup.horizon.max(1) as f32;
     let at = person.pose.position;
     [
         at.x,
         at.z,
-        heading.x,
-        heading.z,
+        heading_sin,
+        heading_cos,
         class_index(world, left),
         class_index(world, right),
         n_in(left),

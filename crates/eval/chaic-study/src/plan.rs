@@ -92,6 +92,9 @@ impl StudyPlan {
                 conditions.len()
             )));
         }
+        if let Some(id) = repeated_house(&study)? {
+            return Err(wrong(format!("`practice` and `episodes` have the house of `{id}` twice")));
+        }
         let mut pool = EpisodePool::default();
         let practice = study.practice.iter().map(|id| pool.add(id.clone()));
         let practice = practice.collect::<Result<Vec<usize>>>()?;
@@ -152,9 +155,11 @@ impl StudyPlan {
     /// The episodes of a condition rotate with each complete block of slots, so that every condition meets
     /// every episode. No participant plays an episode twice.
     pub fn trials(&self, slot: u32) -> Vec<Trial> {
+        // Practice has the seat and the input of the first condition.
+        let first = self.assignment.order(slot)[0];
         let practice = self.practice.iter();
         let mut trials: Vec<Trial> = practice
-            .map(|episode| Trial { position: 0, condition: 0, episode: *episode })
+            .map(|episode| Trial { position: 0, condition: first, episode: *episode })
             .collect();
         let block = self.assignment.block(slot);
         let mut uses: Vec<(Vec<usize>, usize)> = Vec::new();
@@ -234,6 +239,20 @@ impl StudyPlan {
     }
 }
 
+/// Returns the first listed episode that has the house of an earlier one.
+fn repeated_house(study: &Study) -> Result<Option<String>> {
+    let mut houses = BTreeSet::new();
+    for id in study.practice.iter().chain(&study.episodes) {
+        let episode = find_episode(id)?;
+        // Without the person of TASK/SPLIT/NUMBER/PERSON.
+        let house: Vec<&str> = episode.id().split('/').take(3).collect();
+        if !houses.insert(house.join("/")) {
+            return Ok(Some(id.clone()));
+        }
+    }
+    Ok(None)
+}
+
 /// Episodes that were looked up, each once.
 #[derive(Default)]
 struct EpisodePool {
@@ -246,7 +265,12 @@ impl EpisodePool {
         if let Some(found) = self.episodes.iter().position(|episode| episode.id() == id) {
             return Ok(found);
         }
-        self.episodes.push(find_episode(&id)?);
+        // Numbers have several forms, as in `gen/5` and `gen/05`.
+        let episode = find_episode(&id)?;
+        if let Some(found) = self.episodes.iter().position(|known| known.id() == episode.id()) {
+            return Ok(found);
+        }
+        self.episodes.push(episode);
         Ok(self.episodes.len() - 1)
     }
 

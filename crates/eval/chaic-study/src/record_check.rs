@@ -63,16 +63,37 @@ impl RecordCheck {
     /// # Errors
     /// Returns the problem of the record.
     pub fn add(&mut self, plan: &StudyPlan, record: &DataRecord) -> Result<(), String> {
+        if self.is_complete {
+            return Err("a record after `complete`".to_owned());
+        }
         match record {
             DataRecord::Start { .. } => return Err("a second `start`".to_owned()),
-            DataRecord::Instructed {} | DataRecord::Complete {} => {}
+            DataRecord::Instructed {} => {}
+            DataRecord::Complete {} => {
+                let n_ended = self.running.values().filter(|is_running| !**is_running).count();
+                if n_ended < self.trials.len() {
+                    let n = self.trials.len();
+                    return Err(format!("`complete` after {n_ended} of {n} trials"));
+                }
+            }
             DataRecord::Trial { trial } => {
                 if *trial >= self.trials.len() {
                     return Err(format!("slot {} has no trial {trial}", self.slot));
                 }
-                if self.running.insert(*trial, true).is_some() {
+                if self.running.contains_key(trial) {
                     return Err(format!("trial {trial} begins twice"));
                 }
+                if let Some((running, _)) = self.running.iter().find(|(_, is_running)| **is_running)
+                {
+                    return Err(format!("trial {trial} begins while trial {running} runs"));
+                }
+                if *trial != self.running.len() {
+                    return Err(format!(
+                        "trial {trial} begins before trial {}",
+                        self.running.len()
+                    ));
+                }
+                self.running.insert(*trial, true);
             }
             DataRecord::Trace { trial, .. } => {
                 self.running(*trial)?;

@@ -236,11 +236,8 @@ pub fn statistics(views: &[AnnotatedView]) -> BTreeMap<&'static str, SizeCounts>
 
 /// Writes the color and depth images of a view.
 fn write_images(folder: &Path, view: &LabeledView, image: &ImageRecord) -> Result<(), FileError> {
-    let depth: Vec<u8> = view
-        .depth_m
-        .iter()
-        .flat_map(|m| ((m / DEPTH_STEP_M).clamp(0.0, 65_535.0) as u16).to_ne_bytes())
-        .collect();
+    let depth: Vec<u8> =
+        view.depth_m.iter().flat_map(|m| chaic_render::depth_mm(*m).to_ne_bytes()).collect();
     for (name, file, bytes, color) in [
         (IMAGES, &image.file_name, &view.rgb, ExtendedColorType::Rgb8),
         (DEPTH, &image.depth_file_name, &depth, ExtendedColorType::L16),

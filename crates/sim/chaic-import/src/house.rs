@@ -48,7 +48,7 @@ impl<'a> House<'a> {
         layout: &'a str,
         rooms: &'a RoomTypes,
     ) -> Result<House<'a>, (&'static str, String)> {
-        let (number, variant) = scene.split_at(scene.len().min(1));
+        let (number, variant) = scene.split_at_checked(1).unwrap_or_default();
         let plan = FLOORPLANS.get(number).filter(|p| p.variants.contains_key(variant));
         let plan = plan.ok_or_else(|| ("scene", format!("is {scene:?}, which is in no table")))?;
         let names = layout.parse().ok().and_then(|k: usize| rooms.get(number)?.get(k));

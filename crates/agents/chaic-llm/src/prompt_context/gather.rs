@@ -18,7 +18,7 @@ use super::{
 };
 use crate::prompt_track::PromptTrack;
 
-/// Distance from its guardian beyond which a child is lost, metres (docs/metrics.md, emergency
+/// Distance from its guardian beyond which a child is lost, meters (docs/metrics.md, emergency
 /// rate).
 const AWAY_M: f32 = 3.5;
 /// Maximum age of compared positions, frames.
@@ -57,14 +57,17 @@ impl PromptContext {
             containers: labels(&briefing.containers),
             obstacles: labels(&briefing.obstacles),
             capacity: briefing.container_capacity,
-            moving: briefing.possible_targets.iter().any(|c| c.info().role == Role::HeavyTarget),
-            child: briefing.companion(CompanionRole::Child).is_some(),
-            helped: briefing.companion(CompanionRole::Partner).is_some(),
-            images,
+            is_moving_house: briefing
+                .possible_targets
+                .iter()
+                .any(|c| c.info().role == Role::HeavyTarget),
+            has_child: briefing.companion(CompanionRole::Child).is_some(),
+            has_partner: briefing.companion(CompanionRole::Partner).is_some(),
+            n_images: images,
             horizon: briefing.horizon,
             frames_per_10_m: (10.0 / speed / 10.0).round() as u32 * 10,
             me: body(&briefing.capability),
-            told: briefing.disclosure.filter(|_| track == PromptTrack::KnownTask).map(
+            disclosed: briefing.disclosure.filter(|_| track == PromptTrack::KnownTask).map(
                 |disclosure| DisclosedFacts {
                     task: disclosure.task.name(),
                     partner: person(disclosure.partner),
@@ -81,7 +84,7 @@ impl PromptContext {
             progress: progress(context),
             map: map(context, length),
             plans: listed.iter().map(|p| plan_facts(memory, p)).collect(),
-            plans_left_out: plans.len() - listed.len(),
+            n_omitted_plans: plans.len() - listed.len(),
         };
         (facts, listed)
     }
@@ -99,7 +102,7 @@ pub(super) fn keep_nearest(plans: &[Plan], max_per_kind: usize) -> Vec<Plan> {
     kept
 }
 
-pub(super) fn metres(x: f32) -> String {
+pub(super) fn meters(x: f32) -> String {
     let text = format!("{x:.1}");
     if text == "-0.0" { "0.0".to_owned() } else { text }
 }
@@ -127,8 +130,8 @@ pub(super) fn body(capability: &Capability) -> Body {
         kind: impaired(kind, Impairments::from_capability(capability)),
         reach: reach(capability),
         strength_kg: capability.strength_kg as u32,
-        docks: capability.docking_frames > 0,
-        rolls: capability.gait == Gait::Roll,
+        walks_bicycle: capability.docking_frames > 0,
+        uses_wheelchair: capability.gait == Gait::Roll,
     }
 }
 
@@ -184,14 +187,14 @@ fn self_facts(context: &Context<'_>, last_plan: Option<Plan>, length: Length) ->
             interaction(memory, record.frame, record.action, Some(record.outcome), put)
         })
         .collect();
-    let left_out = interactions.len().saturating_sub(length.interactions);
+    let n_omitted = interactions.len().saturating_sub(length.interactions);
     SelfFacts {
-        x: metres(here.x),
-        z: metres(here.y),
+        x: meters(here.x),
+        z: meters(here.y),
         hands: hands.held().map(describe_held).collect(),
         free_hands: usable.filter(|h| hands.hands[h.index()].is_none()).count(),
-        history: interactions[left_out..].to_vec(),
-        history_left_out: left_out,
+        history: interactions[n_omitted..].to_vec(),
+        n_omitted_interactions: n_omitted,
         plan: last_plan.map(|p| plan_text(&p)),
     }
 }
@@ -206,7 +209,7 @@ fn interaction(
 ) -> Interaction {
     let name = |track| named(track, memory.class_of(track));
     let put = put.map_or("something".to_owned(), name);
-    let what = match action {
+    let action = match action {
         Action::PickUp { object, .. } => format!("pick up {}", name(object)),
         Action::PutOn { place, .. } => format!("put {put} on {}", name(place)),
         Action::RemoveObstacle { obstacle, .. } => format!("clear away {}", name(obstacle)),
@@ -218,7 +221,7 @@ fn interaction(
         Outcome::Success => "done".to_owned(),
         Outcome::Failure(reason) => format!("failed ({reason})"),
     });
-    Interaction { frame, what, outcome }
+    Interaction { frame, action, outcome }
 }
 
 fn other_agents(context: &Context<'_>, length: Length) -> Vec<PersonFacts> {
@@ -226,7 +229,7 @@ fn other_agents(context: &Context<'_>, length: Length) -> Vec<PersonFacts> {
     let partner = briefing.companion(CompanionRole::Partner);
     let guardian = partner.and_then(|p| memory.people.get(p));
     let other = |companion: &chaic_core::briefing::Companion| {
-        let who = match (companion.role, briefing.me) {
+        let name = match (companion.role, briefing.me) {
             (CompanionRole::Child, _) => "the child",
             (CompanionRole::Guardian, _) => "the child's guardian",
             (CompanionRole::Partner, AgentId::PARTNER) => "your helper",
@@ -258,21 +261,21 @@ fn other_agents(context: &Context<'_>, length: Length) -> Vec<PersonFacts> {
             .filter(|a| !(is_partner && is_listed_pick_up(a)))
             .map(|a| interaction(memory, a.frame, a.action, a.outcome, None))
             .collect();
-        let left_out = actions.len().saturating_sub(length.interactions);
+        let n_omitted = actions.len().saturating_sub(length.interactions);
         let at = seen.map(|p| to_xz(p.position_in_world)).unwrap_or_default();
         PersonFacts {
-            who,
-            seen: seen.is_some(),
+            name,
+            was_seen: seen.is_some(),
             in_view: seen.is_some_and(|p| p.is_in_view),
             frames_ago: seen.map_or(0, |p| memory.frame.saturating_sub(p.frame)),
-            x: metres(at.x),
-            z: metres(at.y),
-            distance_m: metres(at.distance(memory.position())),
-            away_m: apart_m.map(metres),
-            took: if is_partner { names(&behavior.partner_taken) } else { Vec::new() },
+            x: meters(at.x),
+            z: meters(at.y),
+            distance_m: meters(at.distance(memory.position())),
+            m_from_partner: apart_m.map(meters),
+            picked_up: if is_partner { names(&behavior.partner_taken) } else { Vec::new() },
             holds: if is_partner { names(&behavior.partner_holds) } else { Vec::new() },
-            actions: actions[left_out..].to_vec(),
-            actions_left_out: left_out,
+            actions: actions[n_omitted..].to_vec(),
+            n_omitted_interactions: n_omitted,
         }
     };
     briefing.companions.iter().map(other).collect()
@@ -291,9 +294,9 @@ fn progress(context: &Context<'_>) -> ProgressFacts {
     }
     let place = |(object, path_m): &(&MappedObject, f32)| GoalPlace {
         name: named(object.track, Some(object.class)),
-        x: metres(object.position_in_world.x),
-        z: metres(object.position_in_world.z),
-        way_m: metres(*path_m),
+        x: meters(object.position_in_world.x),
+        z: meters(object.position_in_world.z),
+        path_m: meters(*path_m),
         frames: (WALK_FACTOR * path_m / speed / 10.0).round() as u32 * 10,
     };
     let places = memory.goal_places();
@@ -320,7 +323,7 @@ fn map(context: &Context<'_>, length: Length) -> Map {
         .map(|t| (memory.path_length_to(t).unwrap_or_else(|| 2.0 * t.distance_from(here)), t))
         .collect();
     objects.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let left_out = objects.len().saturating_sub(length.objects);
+    let n_omitted = objects.len().saturating_sub(length.objects);
     objects.truncate(length.objects);
     let facts = |(_, object): &(f32, &MappedObject)| {
         let info = object.class.info();
@@ -338,13 +341,13 @@ fn map(context: &Context<'_>, length: Length) -> Map {
         ObjectFacts {
             kind: kind(object.class).flatten(),
             name: named(object.track, Some(object.class)),
-            x: metres(object.position_in_world.x),
-            z: metres(object.position_in_world.z),
-            top_m: metres(object.top_m),
+            x: meters(object.position_in_world.x),
+            z: meters(object.position_in_world.z),
+            top_m: meters(object.top_m),
             note,
         }
     };
-    Map { things: objects.iter().map(facts).collect(), left_out, explored: is_explored }
+    Map { objects: objects.iter().map(facts).collect(), n_omitted, explored: is_explored }
 }
 
 fn plan_facts(memory: &Memory, plan: &Plan) -> PlanFacts {
@@ -355,5 +358,5 @@ fn plan_facts(memory: &Memory, plan: &Plan) -> PlanFacts {
         Plan::Deliver => memory.goal_places().first().map(|(_, path_m)| *path_m),
         _ => None,
     };
-    PlanFacts { text: plan_text(plan), way_m: path_m.map(metres) }
+    PlanFacts { text: plan_text(plan), path_m: path_m.map(meters) }
 }

@@ -2,7 +2,7 @@
 
 use chaic_core::capability::Persona;
 
-use super::gather::{body, metres, person, reach};
+use super::gather::{body, meters, person, reach};
 use super::{
     Count, DisclosedFacts, GoalPlace, Interaction, Map, ObjectFacts, PersonFacts, PlanFacts,
     ProgressFacts, PromptContext, SelfFacts,
@@ -19,14 +19,14 @@ impl PromptContext {
             containers: vec!["wicker basket".to_owned()],
             obstacles: vec!["chair".to_owned()],
             capacity: 3,
-            moving: false,
-            child: true,
-            helped: true,
-            images: 10,
+            is_moving_house: false,
+            has_child: true,
+            has_partner: true,
+            n_images: 10,
             horizon: 3000,
             frames_per_10_m: 210,
             me: body(&Persona::Child.capability()),
-            told: Some(DisclosedFacts {
+            disclosed: Some(DisclosedFacts {
                 task: "shopping",
                 partner: person(Persona::Rider.into()),
                 reach: reach(&Persona::Wheelchair.capability()),
@@ -34,82 +34,82 @@ impl PromptContext {
             }),
             wanted: vec![Count { name: "apple".to_owned(), count: 2 }],
             own: SelfFacts {
-                x: metres(1.0),
-                z: metres(-2.0),
+                x: meters(1.0),
+                z: meters(-2.0),
                 hands: vec!["apple #31".to_owned()],
                 free_hands: 1,
                 history: vec![Interaction {
                     frame: 10,
-                    what: "pick up apple #31".to_owned(),
+                    action: "pick up apple #31".to_owned(),
                     outcome: Some("done".to_owned()),
                 }],
-                history_left_out: 3,
+                n_omitted_interactions: 3,
                 plan: Some("explore".to_owned()),
             },
             others: vec![PersonFacts {
-                who: "your partner",
-                seen: true,
+                name: "your partner",
+                was_seen: true,
                 in_view: false,
                 frames_ago: 30,
-                x: metres(3.0),
-                z: metres(4.0),
-                distance_m: metres(5.0),
-                away_m: Some(metres(6.0)),
-                took: vec!["apple #32".to_owned()],
+                x: meters(3.0),
+                z: meters(4.0),
+                distance_m: meters(5.0),
+                m_from_partner: Some(meters(6.0)),
+                picked_up: vec!["apple #32".to_owned()],
                 holds: vec!["apple #32".to_owned()],
                 actions: vec![Interaction {
                     frame: 20,
-                    what: "pick up bread #40".to_owned(),
+                    action: "pick up bread #40".to_owned(),
                     outcome: None,
                 }],
-                actions_left_out: 2,
+                n_omitted_interactions: 2,
             }],
             progress: ProgressFacts {
                 frame: 400,
                 goal_places: vec![GoalPlace {
                     name: "bed #50".to_owned(),
-                    x: metres(5.0),
-                    z: metres(5.0),
-                    way_m: metres(7.0),
+                    x: meters(5.0),
+                    z: meters(5.0),
+                    path_m: meters(7.0),
                     frames: 220,
                 }],
                 delivered: vec![Count { name: "apple".to_owned(), count: 1 }],
             },
             map: Map {
-                things: vec![ObjectFacts {
+                objects: vec![ObjectFacts {
                     kind: Some("container"),
                     name: "wicker basket #60".to_owned(),
-                    x: metres(2.0),
-                    z: metres(2.0),
-                    top_m: metres(0.4),
+                    x: meters(2.0),
+                    z: meters(2.0),
+                    top_m: meters(0.4),
                     note: Some("in somebody's hands".to_owned()),
                 }],
-                left_out: 4,
+                n_omitted: 4,
                 explored: true,
             },
             plans: vec![
-                PlanFacts { text: "explore".to_owned(), way_m: None },
+                PlanFacts { text: "explore".to_owned(), path_m: None },
                 PlanFacts {
                     text: "go to apple #33 and pick it up".to_owned(),
-                    way_m: Some(metres(3.0)),
+                    path_m: Some(meters(3.0)),
                 },
             ],
-            plans_left_out: 5,
+            n_omitted_plans: 5,
         };
         let empty = |track| {
             let all = full(track);
             PromptContext {
                 containers: Vec::new(),
                 obstacles: Vec::new(),
-                moving: true,
-                child: false,
-                helped: false,
-                images: 0,
+                is_moving_house: true,
+                has_child: false,
+                has_partner: false,
+                n_images: 0,
                 me: body(&Persona::Helper.capability()),
-                told: all.told.map(|told| DisclosedFacts {
+                disclosed: all.disclosed.map(|disclosed| DisclosedFacts {
                     task: "moving_house",
                     reach: None,
-                    ..told
+                    ..disclosed
                 }),
                 own: SelfFacts {
                     hands: vec![],
@@ -119,15 +119,15 @@ impl PromptContext {
                     ..all.own
                 },
                 others: vec![PersonFacts {
-                    seen: false,
-                    took: vec![],
+                    was_seen: false,
+                    picked_up: vec![],
                     holds: vec![],
                     actions: vec![],
                     ..all.others[0].clone()
                 }],
                 progress: ProgressFacts { frame: 0, goal_places: vec![], delivered: vec![] },
-                map: Map { things: vec![], left_out: 0, explored: false },
-                plans_left_out: 0,
+                map: Map { objects: vec![], n_omitted: 0, explored: false },
+                n_omitted_plans: 0,
                 ..all
             }
         };

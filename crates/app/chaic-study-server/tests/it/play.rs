@@ -142,6 +142,9 @@ fn an_episode_is_played_to_its_end() {
     let client = server.client(1);
     client.begin();
     client.open(0);
+    // The participant cannot end the study during an episode, and then read its goal.
+    let complete = ["{\"type\":\"complete\"}\n".to_owned()];
+    assert_eq!(client.append(2, &complete).status, 422);
     let mut answers = play(&client, 0, 50, MAX_TURN_FRAMES);
     while answers.last().expect("a turn").turn().0["status"] != "ended" {
         server.wait_secs(3);

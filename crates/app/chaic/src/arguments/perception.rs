@@ -80,7 +80,7 @@ pub struct CollectDetectionArguments {
     /// Kind of scenes.
     #[arg(long, value_enum, default_value_t = SceneSelection::Crowded)]
     pub scenes: SceneSelection,
-    /// Light and colors [default: as in the training, a third of the scenes varied].
+    /// Light and colors [default: a third of crowded scenes varied, as in the training, others canonical].
     #[arg(long, alias = "look", value_enum)]
     pub appearance: Option<AppearanceArgument>,
     /// Views in parallel, 1 to 1024; does not change the views [default: one per core].

@@ -92,7 +92,16 @@ fn collected_files_are_exported_and_deleted() {
     });
     fs::create_dir(at.join("data")).expect("the disk has space");
     let file = at.join("data/any name.jsonl");
-    fs::write(&file, format!("{start}\n{{\"type\":\"complete\"}}\n")).expect("the disk has space");
+    let trials = [0, 1].map(|trial| {
+        [
+            serde_json::json!({ "type": "trial", "trial": trial }),
+            serde_json::json!({ "type": "trial_end", "trial": trial, "outcome": "left" }),
+        ]
+    });
+    let records = std::iter::once(start).chain(trials.into_iter().flatten());
+    let records = records.chain([serde_json::json!({ "type": "complete" })]);
+    let lines: String = records.map(|record| format!("{record}\n")).collect();
+    fs::write(&file, lines).expect("the disk has space");
     let export = ["study", "export", "data", "--study", "study.toml", "--out"];
     let printed = run_ok(at, &[&export[..], &["set"]].concat());
     assert!(printed.contains("1 participant, 1 complete; 0 of 0 traces verified"), "{printed}");

@@ -3,7 +3,7 @@
 use std::io::{BufRead as _, BufReader, ErrorKind, Read, Write};
 use std::path::Path;
 
-use chaic_files::{FileError, open_user_file};
+use chaic_files::{FileError, LOCK, open_user_file};
 use flate2::bufread::MultiGzDecoder;
 use tar::{EntryType, Header};
 
@@ -119,6 +119,10 @@ impl Scan<'_> {
             }
         }
         let path = check_path(name).map_err(refuse)?.to_owned();
+        // Archives are packed and hashed without lock files.
+        if path.rsplit('/').next() == Some(LOCK) {
+            return Err(refuse(format!("is named `{LOCK}`")));
+        }
         self.paths.add(&path, is_folder).map_err(refuse)?;
         if size > MAX_FILE_BYTES {
             return Err(refuse(format!("has {size} bytes, more than {MAX_FILE_BYTES}")));

@@ -116,6 +116,8 @@ fn terms(table: &LeaderboardTable) -> Vec<(&'static str, String)> {
         ("Partner", rules.partner.clone()),
         ("Person", rules.person.clone().unwrap_or_else(|| "as in the episodes".to_owned())),
         ("Appearance", rules.appearance.clone()),
+        ("Perception", rules.perception.clone()),
+        ("Behavior recognition", rules.behavior.clone()),
         ("Images", size),
         ("chaic", rules.chaic.clone()),
     ]

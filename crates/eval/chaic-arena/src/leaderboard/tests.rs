@@ -24,6 +24,8 @@ fn rules(split: &str, track: &str) -> EvaluationConditions {
         partner: "rules".to_owned(),
         person: None,
         appearance: "canonical".to_owned(),
+        perception: "gt".to_owned(),
+        behavior: "gt".to_owned(),
     }
 }
 
@@ -96,20 +98,23 @@ fn rows_of_different_rules_are_in_different_tables() {
         (rules("a", "unrestricted"), rules("a", "hidden"), rules("b", "unrestricted"));
     let size = EvaluationConditions { size: Some(64), ..unrestricted.clone() };
     let version = EvaluationConditions { chaic: "0.2.0".to_owned(), ..unrestricted.clone() };
-    let all = [&unrestricted, &hidden, &other, &size, &version];
+    let perception =
+        EvaluationConditions { perception: "learned".to_owned(), ..unrestricted.clone() };
+    let behavior = EvaluationConditions { behavior: "learned".to_owned(), ..unrestricted.clone() };
+    let all = [&unrestricted, &hidden, &other, &size, &version, &perception, &behavior];
     let entries = all.iter().enumerate().flat_map(|(k, rules)| {
         [entry(&format!("m{k}"), rules, [5; 6]), entry(&format!("n{k}"), rules, [6; 6])]
     });
     let board = leaderboard(entries.collect());
-    assert_eq!((board.tables.len(), board.n_submissions()), (5, 10));
+    assert_eq!((board.tables.len(), board.n_submissions()), (7, 14));
     for table in &board.tables {
         let k = all.iter().position(|rules| **rules == table.conditions).expect("given rules");
         let names: Vec<&str> = table.rows.iter().map(|row| row.name.as_str()).collect();
         assert_eq!(names, [&format!("n{k}"), &format!("m{k}"), "rhp", NONE]);
     }
     let page = board.to_html("t");
-    assert_eq!(page.matches("<table>").count(), 3 * 5);
-    assert_eq!(page.matches("<caption>").count(), 3 * 5);
+    assert_eq!(page.matches("<table>").count(), 3 * 7);
+    assert_eq!(page.matches("<caption>").count(), 3 * 7);
 }
 
 #[test]

@@ -56,6 +56,7 @@ fn paths() -> Vec<Case> {
         ("space at the start", at_path(b"helper/ evil"), "begins with a space"),
         ("long", at_prefix(&[long.clone(), vec![b'b'; 10]].concat(), &long), "longer than 200"),
         ("deep", at_path(deep.as_bytes()), "has more than 8 names"),
+        ("lock file", at_path(b"helper/.lock"), "is named `.lock`"),
         ("parent in the prefix", at_prefix(b"..", b"evil"), "leads out of the archive"),
         ("absolute prefix", at_prefix(b"/etc", b"evil"), "is an absolute path"),
     ]

@@ -227,7 +227,40 @@ fn differences_are_paired_with_intervals_over_houses() {
         (r.environments, r.median, r.largest),
         (2, shared.half_width(), shared.half_width())
     );
+    // Of two half widths the median is the smaller one.
+    let two = [difference(&houses(&["a", "a", "b", "b"])), apart];
+    let r = resolution(&two, None).unwrap();
+    assert_eq!((r.median, r.largest), (all.half_width(), shared.half_width()));
+    assert!(r.median < r.largest);
     assert_eq!(resolution(&[], None), None);
+}
+
+#[test]
+fn a_summary_has_at_most_the_goal_within_rounding() {
+    let check = |done: f64| result(case("rhp", "e", done, 10.0)).check();
+    assert_eq!(check(10.0 + 1e-6), Ok(()), "masses are sums of rounded values");
+    let message = check(10.0 + 1e-3).unwrap_err();
+    assert!(message.contains("expected at most `total`"), "{message}");
+}
+
+#[test]
+fn scores_have_the_mean_of_each_diagnostic_metric() {
+    let key = Metric::diagnostics().next().unwrap().key;
+    let results: Vec<RunResult> = [0.25, 0.75]
+        .into_iter()
+        .zip(["a", "b"])
+        .map(|(value, episode)| {
+            let mut result = result(case("rhp", episode, 1.0, 10.0));
+            let RunStatus::Done(summary) = &mut result.status else { unreachable!() };
+            summary.diagnostics.insert(key.to_owned(), value);
+            result
+        })
+        .collect();
+    let environments = Environments::default();
+    let played = PlayedEpisodes { results: &results, planned: &[], environments: &environments };
+    let scores = Scores::new(played, &FormulaSet::Paper.formulas());
+    let score = &scores.tasks[&TaskId::LowTarget]["rhp"];
+    assert_close(score.diagnostics.get(key).copied(), 0.5);
 }
 
 #[test]

@@ -95,3 +95,24 @@ impl ReportState {
         matches!(self, ReportState::Compared { missing, altered } if missing.is_empty() && altered.is_empty())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use chaic_core::TaskId;
+
+    use super::*;
+
+    #[test]
+    fn missing_and_failed_runs_are_incomplete() {
+        let key = || RunKey {
+            task: TaskId::Obstacle,
+            helper: "rhp".to_owned(),
+            episode: "obstacle/test/00".to_owned(),
+            seed: 0,
+        };
+        let all = Coverage { planned: 2, ..Coverage::default() };
+        assert!(all.is_complete());
+        assert!(!Coverage { missing: vec![key()], ..all.clone() }.is_complete());
+        assert!(!Coverage { failed: vec![key()], ..all }.is_complete());
+    }
+}

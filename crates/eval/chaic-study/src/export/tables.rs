@@ -17,7 +17,7 @@ const COMMON: [(&str, &str); 4] = [
     ("participant", "random code of the participant"),
     ("slot", "number that determines the order of conditions, from 1"),
     ("position", "position of the condition, from 1; 0 for practice and for forms at the end"),
-    ("condition", "combination of factor levels; empty for forms at the end"),
+    ("condition", "combination of factor levels; empty for practice and for forms at the end"),
 ];
 /// Columns of forms.
 const FORM: (&str, &str) = ("form", "name of the questionnaire");
@@ -118,8 +118,8 @@ impl Tables {
     fn common(&self, (code, slot): (&str, u32), trial: Option<Trial>) -> Vec<String> {
         let position = trial.map_or(0, |trial| trial.position);
         let condition = match trial {
-            Some(trial) => self.conditions[trial.condition].clone(),
-            None => vec![String::new(); self.factors.len() + 1],
+            Some(trial) if position > 0 => self.conditions[trial.condition].clone(),
+            _ => vec![String::new(); self.factors.len() + 1],
         };
         let cells = [code.to_owned(), slot.to_string(), position.to_string()];
         cells.into_iter().chain(condition).collect()

@@ -64,6 +64,10 @@ fn records(plan: &StudyPlan, code: &str, slot: u32) -> Vec<Value> {
         json!({ "type": "trial", "trial": 1 }),
         json!({ "type": "trial_end", "trial": 1, "outcome": "left" }),
         json!({ "type": "answers", "position": 1, "form": "trust", "ratings": trust }),
+        json!({ "type": "trial", "trial": 2 }),
+        json!({ "type": "trial_end", "trial": 2, "outcome": "left" }),
+        json!({ "type": "trial", "trial": 3 }),
+        json!({ "type": "trial_end", "trial": 3, "outcome": "left" }),
         json!({ "type": "complete" }),
     ]
 }
@@ -191,6 +195,11 @@ fn hostile_files_are_refused_in_one_line() {
     let mut repeated = good.clone();
     repeated.insert(2, good[2].clone());
     let ratings = |value: Value| with(8, "ratings", value);
+    let mut early = good.clone();
+    early.remove(12);
+    let mut at_once = good.clone();
+    at_once.remove(5);
+    let late = [good.clone(), vec![json!({ "type": "instructed" })]].concat();
     for (records, words) in [
         (Vec::new(), "line 1: the first record must be `start`"),
         (good[1..].to_vec(), "the first record must be `start`"),
@@ -201,6 +210,10 @@ fn hostile_files_are_refused_in_one_line() {
         (with(0, "slot", json!(49)), "no slot 49"),
         (with(0, "slot", json!(-1)), "line 1: no record"),
         (repeated, "trial 0 begins twice"),
+        (early, "`complete` after 3 of 4 trials"),
+        (at_once, "trial 1 begins while trial 0 runs"),
+        (with(2, "trial", json!(1)), "trial 1 begins before trial 0"),
+        (late, "a record after `complete`"),
         (with(2, "trial", json!(4)), "has no trial 4"),
         (with(4, "trial", json!(1)), "trial 1 is not running"),
         (with(5, "outcome", json!("won")), "unknown variant `won`"),
@@ -244,7 +257,7 @@ fn a_deleted_participant_leaves_no_bytes_behind() {
     fs::remove_dir_all(&derived).expect("it exists");
     let deleted = delete(CODE, &all).expect("a code");
     assert_eq!(deleted.files.len(), 2, "{deleted:?}");
-    assert_eq!(deleted.rows, 3 + 1 + 2, "{deleted:?}");
+    assert_eq!(deleted.rows, 3 + 1 + 4, "{deleted:?}");
     assert_eq!(deleted.unsearched, Vec::<PathBuf>::new());
     for entry in chaic_files::walk(&all, 8).expect("a folder") {
         let bytes = fs::read(&entry.path).expect("a file");

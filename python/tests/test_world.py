@@ -96,6 +96,8 @@ def test_render_accepts_an_agent_or_a_camera(episode):
     camera = world.observe().camera | {"width": 40, "height": 30}
     assert world.render(camera=camera)["rgb"].shape == (30, 40, 3)
     assert world.floor_plan(200).shape[1] == 200
+    with pytest.raises(ValueError, match="width is 63, expected 64 to 8192"):
+        world.floor_plan(63)
     assert world._repr_png_()[:4] == b"\x89PNG"
 
 

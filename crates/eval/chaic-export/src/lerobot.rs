@@ -3,6 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
+use chaic_core::geom::math;
 use chaic_core::{Action, AgentId, EntityId, Frame, Hand, ResolvedAction};
 use chaic_env::Playback;
 use chaic_env::trace::{Decision, Trace};
@@ -541,16 +542,14 @@ fn encode_state(world: &World, agent: AgentId) -> [f32; STATE.len()] {
         });
         inside.count() as f32
     };
-    // 0 looks along -z, positive turns left, as in the observations of environments.
-    let forward = chaic_core::geom::forward(person.pose.yaw_rad);
-    let (heading_sin, heading_cos) = (-forward.x, -forward.z);
+    let yaw_rad = person.pose.yaw_rad;
     let time = state.frame as f32 / setup.horizon.max(1) as f32;
     let at = person.pose.position;
     [
         at.x,
         at.z,
-        heading_sin,
-        heading_cos,
+        math::sin(yaw_rad),
+        math::cos(yaw_rad),
         class_index(world, left),
         class_index(world, right),
         n_in(left),

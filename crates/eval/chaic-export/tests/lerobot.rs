@@ -5,6 +5,7 @@
 use std::fs::{self, File};
 use std::path::Path;
 
+use chaic_core::geom::math;
 use chaic_core::{AgentError, AgentId};
 use chaic_env::helper_registry::{BuiltInHelpers, find};
 use chaic_env::rules::RuleSet;
@@ -82,6 +83,11 @@ fn an_episode_is_exported_as_a_table_and_a_video() {
         total_reward += f64::from(*reward);
         let Field::ListInternal(state) = field(row, "observation.state") else { panic!("{row}") };
         assert_eq!(state.elements().len(), 9);
+        if k == 0 {
+            let yaw_rad = episode.setup().people[AgentId::HELPER.index()].pose.yaw_rad;
+            let heading = [math::sin(yaw_rad), math::cos(yaw_rad)].map(Field::Float);
+            assert_eq!(state.elements()[2..4], heading);
+        }
         let is_last = k + 1 == samples.len();
         assert_eq!(field(row, "next.done"), &Field::Bool(is_last));
     }
@@ -111,5 +117,7 @@ fn invalid_options_are_reported_before_files_are_written() {
     let out = folder.path().join("set");
     let error = LeRobotWriter::create(&out, LeRobotOptions { every: 7, ..OPTIONS });
     assert!(matches!(error, Err(ExportError::Rate { every: 7, .. })));
+    let error = LeRobotWriter::create(&out, LeRobotOptions { image_size: 33, ..OPTIONS });
+    assert!(matches!(error, Err(ExportError::Size(33))));
     assert!(!out.exists());
 }

@@ -65,6 +65,12 @@ fn errors_name_the_key_and_the_expectation() {
         ("[factors]", "trials = 2\n[factors]", "a participant plays 6 of them"),
         ("high_target/test/02", "high_target/test/01", "must not repeat `high_target/test/01`"),
         ("no_constraint/train/00", "high_target/test/00", "must not repeat `high_target/test/00`"),
+        ("high_target/test/02", "high_target/test/1", "the house of `high_target/test/1` twice"),
+        (
+            "high_target/test/02",
+            "high_target/test/01/+tremor",
+            "the house of `high_target/test/01/",
+        ),
         ("high_target/test/02", "high_target/test/99", "high_target/test/99"),
         ("\"infer\"]", "\"deep\"]", "`helper` names `deep`; expected one of none, random"),
         (
@@ -118,6 +124,7 @@ fn conditions_meet_every_episode_and_no_participant_meets_one_twice() {
         let trials = plan.trials(slot);
         assert_eq!(trials.len(), 4);
         assert_eq!((trials[0].position, plan.helper(trials[0])), (0, "none"));
+        assert_eq!(trials[0].condition, trials[1].condition, "practice is like what follows");
         let mut episodes: Vec<usize> = trials.iter().map(|trial| trial.episode).collect();
         episodes.sort_unstable();
         episodes.dedup();

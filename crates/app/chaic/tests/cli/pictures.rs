@@ -252,6 +252,10 @@ fn scene_files_and_benchmarks() {
         let out = output_of(at, &[&["bench", "render"], &wrong[..]].concat());
         assert_eq!(out.status.code(), Some(2), "{wrong:?}: {}", self::text(&out.stderr));
     }
+    let out = output_of(at, &["bench", "env", "--task", "obstacle,one_handed"]);
+    let message = self::text(&out.stderr);
+    assert!(message.contains("one_handed has no training episode"), "{message}");
+    assert_eq!(out.status.code(), Some(2), "{message}");
 }
 
 #[test]

@@ -115,6 +115,7 @@ fn an_export_has_verified_traces_answers_and_scores() {
         ["stopped", "left", "left"]
     );
     assert_eq!([cells(0, "verified"), cells(1, "verified")], ["1", "0"]);
+    assert_eq!([cells(0, "condition"), cells(0, "factor_helper")], ["", ""], "practice");
     assert_eq!(cells(0, "trace"), format!("traces/{CODE}/trial-00.jsonl"));
     let answers = rows(&out, "answers");
     let ratings: Vec<&str> = answers.iter().map(|row| row["rating"].as_str()).collect();

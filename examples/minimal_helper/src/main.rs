@@ -14,6 +14,7 @@ use chaic_agents::PlanningAgent;
 use chaic_agents::decision::{Context, Plan, Policy};
 use chaic_core::observation::Grants;
 use chaic_core::{Agent, AgentError, Briefing, TaskId};
+use chaic_env::CHAIC_VERSION;
 use chaic_env::helper_registry::{Helper, HelperRegistry};
 use chaic_env::rules::PlannerRules;
 use chaic_eval::metrics::FormulaSet;
@@ -78,7 +79,7 @@ fn main() -> Result<()> {
     let run = evaluate(Path::new(&out), &tasks, 4)?;
     let (options, results, planned) = (run.options(), run.results(), run.planned());
     let (granted, formulas) = (Some(run.granted()), FormulaSet::Paper);
-    let report = Report { options, results, planned, granted, formulas };
+    let report = Report { version: CHAIC_VERSION, options, results, planned, granted, formulas };
     println!("{}", report.text(Format::Table));
     Ok(())
 }

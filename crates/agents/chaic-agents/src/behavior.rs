@@ -148,7 +148,7 @@ impl BehaviorModel for GroundTruthBehavior {
 pub struct InferredBehavior {
     watched: AgentId,
     log: BehaviorLog,
-    /// Positions at which objects were seen lying.
+    /// Positions at which objects were seen lying before they were taken.
     lying_positions: BTreeMap<TrackId, Vec3>,
 }
 
@@ -165,7 +165,13 @@ impl InferredBehavior {
         for object in memory.objects.iter().filter(is_lying).filter(|t| t.class.info().is_movable())
         {
             let at = object.position_in_world;
-            let before = self.lying_positions.insert(object.track, at);
+            let is_taken = self.log.partner_taken.iter().any(|(track, _)| *track == object.track);
+            if !is_taken {
+                self.lying_positions.insert(object.track, at);
+                continue;
+            }
+            // Elsewhere it was put down after a real pick-up.
+            let before = self.lying_positions.get(&object.track);
             if before.is_some_and(|b| b.distance(at) < SAME_PLACE_M) {
                 let is_it = |a: &ObservedInteraction| a.action.subject() == Some(object.track);
                 self.log.partner_taken.retain(|(track, _)| *track != object.track);
@@ -203,6 +209,10 @@ impl BehaviorModel for InferredBehavior {
         for object in &held {
             if !log.partner_taken.contains(object) {
                 log.partner_taken.push(*object);
+                // An object that was never seen lying may lie where it seems to be held.
+                if let Some(seen) = memory.objects.get(object.0) {
+                    self.lying_positions.entry(object.0).or_insert(seen.position_in_world);
+                }
                 log.actions.push(ObservedInteraction {
                     agent: self.watched,
                     frame: observation.frame,
@@ -321,6 +331,15 @@ mod tests {
             assert_eq!(log.actions.len(), n_taken, "each pick-up is one action");
         }
         assert_eq!(model.log().partner_taken[0].0, TrackId(20), "the child holds the other object");
+        // The apple lies elsewhere: it was taken, and put down there.
+        for frame in [42, 44, 46] {
+            toy.frame = frame;
+            let observation = toy.observe();
+            let percepts = Percepts { detections: vec![apple(-2.0)], ..Percepts::default() };
+            memory.update(&briefing, &observation, &percepts);
+            model.observe(&observation, &memory);
+            assert_eq!(model.log().partner_taken.len(), 1, "frame {frame}");
+        }
         // The apple is seen at its first position, so it was never taken.
         toy.frame = 50;
         let observation = toy.observe();

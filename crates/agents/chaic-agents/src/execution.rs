@@ -370,7 +370,14 @@ impl Executor {
         s: &mut ExecutionContext<'_>,
     ) -> Progress {
         let Some(agent) = s.briefing.companion(role) else { return Progress::Failed };
-        match self.follower.step(s.memory, self.navigator.as_mut(), agent, keep_m) {
+        // The child is accompanied, not let through. The original's helpers stand in the way.
+        let gives_way =
+            role == CompanionRole::Partner && s.memory.rules.walking == Walking::Careful;
+        let navigator = self.navigator.as_mut();
+        if gives_way && let Some(action) = self.follower.give_way(s.memory, navigator, agent) {
+            return Progress::Act(action);
+        }
+        match self.follower.step(s.memory, navigator, agent, keep_m) {
             FollowStep::Act(action) => Progress::Act(action),
             FollowStep::Near(action) => {
                 self.recovery.record_stop();

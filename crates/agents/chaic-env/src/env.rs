@@ -263,7 +263,11 @@ impl Env {
         let ids = std::mem::take(&mut turn.spare_ids);
         let slot = &self.slots[agent.index()];
         let mut rendered = self.renderer.observe_into(&self.world, agent, slot, images, ids);
-        rendered.observation.frame_history = std::mem::take(&mut turn.frame_history).into();
+        // A repeated observation keeps the history of the first one.
+        rendered.observation.frame_history = match turn.rendered.take() {
+            Some(first) => first.observation.frame_history,
+            None => std::mem::take(&mut turn.frame_history).into(),
+        };
         turn.rendered = Some(rendered);
     }
 

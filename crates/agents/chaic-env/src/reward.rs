@@ -69,9 +69,10 @@ pub struct RewardTerms {
     /// Fraction of all wanted objects that was delivered since the start of the action, by any agent,
     /// 0 to 1.
     pub delivered: f64,
-    /// Decrease of the remaining distance to the next delivery, meters: in straight lines to the best
-    /// target and from there to the goal place. Targets that were taken, dropped or delivered during the
-    /// action do not count, so other agents' actions have no effect and going back and forth earns nothing.
+    /// Decrease of the remaining distance to the next delivery, meters: in straight lines to the
+    /// best target and from there to the goal place. Targets that another agent took or dropped, or
+    /// that were delivered, do not count, so other agents' actions have no effect and going back
+    /// and forth earns nothing.
     pub progress_m: f64,
     /// True if the action has ended and failed.
     pub is_invalid: bool,

@@ -147,7 +147,7 @@ pub struct Participant {
     /// Requested images.
     #[serde(alias = "senses")]
     pub sensors: SensorConfig,
-    /// Perception of a built-in agent; absent if ids are granted or for agents of other authors.
+    /// Perception of a built-in agent; absent for the perception `gt` and for agents of other authors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub perception: Option<String>,
     /// Confinement of its process, such as `sandbox`; absent for an agent in this process.

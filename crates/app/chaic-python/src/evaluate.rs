@@ -12,7 +12,7 @@ use chaic_agents::perception_factory::GROUND_TRUTH;
 use chaic_core::observation::{Grants, SensorConfig};
 use chaic_core::{Action, Agent, AgentError};
 use chaic_env::helper_registry::{BuiltInWithPerception, Helper, HelperRegistry, check_new_name};
-use chaic_env::{RunKey, Track};
+use chaic_env::{CHAIC_VERSION, RunKey, Track};
 use chaic_eval::EvalError;
 use chaic_eval::metrics::FormulaSet;
 use chaic_eval::report::{Format, Report, write_files};
@@ -156,6 +156,7 @@ impl Keywords {
 /// Writes report and figures into the folder of a complete run; returns the report as a table.
 fn write_report(run: &Run) -> Result<String, EvalError> {
     let report = Report {
+        version: CHAIC_VERSION,
         options: run.options(),
         results: run.results(),
         planned: run.planned(),

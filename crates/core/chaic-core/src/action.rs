@@ -135,6 +135,11 @@ impl<T: Copy> Action<T> {
     pub fn is_locomotion(&self) -> bool {
         matches!(self, Action::MoveForward | Action::TurnLeft | Action::TurnRight)
     }
+
+    /// Returns whether the action is more than moving, turning or waiting.
+    pub fn is_interaction(&self) -> bool {
+        !self.is_locomotion() && !matches!(self, Action::Wait { .. })
+    }
 }
 
 /// Reason of a failed action.

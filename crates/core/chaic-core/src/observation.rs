@@ -282,7 +282,7 @@ pub struct HeldIdentity {
     pub entity: EntityId,
     /// Class of the object.
     pub class: ClassId,
-    /// Contents in the order of insertion; empty for all but containers and vehicles.
+    /// Contents in the order of their slots; empty for all but containers and vehicles.
     pub contents: Vec<(EntityId, ClassId)>,
 }
 

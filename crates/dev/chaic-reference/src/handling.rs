@@ -175,6 +175,9 @@ impl Turn<'_> {
         place: EntityId,
     ) -> Step {
         let n = self.facts.numbers;
+        if !matches!(self.thing(place).location, Location::Rests(_)) {
+            return Step::Fails(FailureReason::Impossible);
+        }
         if self.is_paper() {
             let is_within_reach = self.is_within_reach(agent, place);
             if !self.choices.decide(is_within_reach) {

@@ -101,7 +101,7 @@ pub const SCENARIOS: [Scenario; 10] = [
             GENERATE,
             Step::Shorten("e"),
             Step::Run(
-                "eval --episodes e --helper none,rhp --size 16 --jobs 1 --shard 1/2 --out run",
+                "eval --episodes e --helper rhp --seeds 2 --size 16 --jobs 1 --shard 1/2 --out run",
             ),
         ],
         command: "eval --resume --jobs 1 --out run",
@@ -115,8 +115,12 @@ pub const SCENARIOS: [Scenario; 10] = [
         steps: &[
             GENERATE,
             Step::Shorten("e"),
-            Step::Run("eval --episodes e --helper none,rhp --size 16 --jobs 1 --shard 1/2 --out a"),
-            Step::Run("eval --episodes e --helper none,rhp --size 16 --jobs 1 --shard 2/2 --out b"),
+            Step::Run(
+                "eval --episodes e --helper rhp --seeds 2 --size 16 --jobs 1 --shard 1/2 --out a",
+            ),
+            Step::Run(
+                "eval --episodes e --helper rhp --seeds 2 --size 16 --jobs 1 --shard 2/2 --out b",
+            ),
         ],
         command: "merge --out run a b",
         outputs: &["run"],

@@ -236,7 +236,9 @@ impl SubmissionScore {
             .check_play(&run.options)
             .and_then(|()| submission.check_grants(grants))
             .map_err(|problem| ArenaError::Score { path: path(), problem })?;
+        let version = run.folder.version()?.unwrap_or_default();
         let report = Report {
+            version: &version,
             options: &run.options,
             results: &run.results,
             planned: &run.planned,

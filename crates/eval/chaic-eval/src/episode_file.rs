@@ -24,7 +24,7 @@ pub(crate) fn read_episode_files(folder: &Path) -> Result<Vec<Episode>> {
     parse_episode_files(folder, &read_episode_file)
 }
 
-/// Reads and parses the `.json` files of a folder, sorted by id.
+/// Reads and parses the `.json` files of a folder, sorted by id as text: `gen/10` is before `gen/2`.
 pub(crate) fn parse_episode_files(
     folder: &Path,
     read: &dyn Fn(&Path) -> Result<Vec<u8>>,

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use chaic_core::agent::PartnerBelief;
 use chaic_core::capability::Persona;
 use chaic_core::catalogue::TargetSet;
-use chaic_core::{AgentId, ClassId, Frame};
+use chaic_core::{AgentId, Frame};
 use chaic_env::RunKey;
 use chaic_env::trace::{Record, Trace};
 use chaic_world::{EventKind, Setup};
@@ -247,24 +247,20 @@ fn last_frame(trace: &Trace) -> Frame {
     trace.decisions().last().map_or(0, |decision| decision.frame)
 }
 
+/// Counts the deliveries of possible targets by an agent; containers are not counted.
 fn deliveries(trace: &Trace, agent: AgentId) -> DeliveryCounts {
     let mut counts = DeliveryCounts::default();
     for record in &trace.records {
         if let Record::Event(event) = record
             && let EventKind::Delivered { by, counted, .. } = event.event.kind
             && by == agent
-            && event.class.is_some_and(is_target)
+            && event.class.is_some_and(|class| class.info().is_possible_target())
         {
             counts.all += 1;
             counts.counted += u32::from(counted);
         }
     }
     counts
-}
-
-/// Returns whether a class can be a target; containers cannot.
-fn is_target(class: ClassId) -> bool {
-    !class.info().sets.is_empty()
 }
 
 #[cfg(test)]

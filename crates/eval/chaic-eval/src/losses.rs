@@ -12,7 +12,7 @@ use chaic_core::observation::Grants;
 use chaic_env::helper_registry::NONE;
 use serde::Serialize;
 
-use crate::metrics::{Difference, Interval, PlayedEpisodes, differences};
+use crate::metrics::{Interval, PlayedEpisodes, RunResult, differences};
 use crate::report::{Format, Report, TextTable, interval, title};
 use crate::run::RunGrants;
 
@@ -88,23 +88,28 @@ impl Losses {
                 names.join(", ")
             ));
         }
-        let differences = differences(played, helpers);
-        let helpers = steps
+        let helpers: Vec<HelperLosses> = steps
             .iter()
-            .map(|(helper, steps)| HelperLosses {
-                helper: (*helper).clone(),
-                losses: steps.iter().map(|step| step.loss(&differences)).collect(),
+            .map(|(helper, steps)| {
+                let compared: BTreeSet<&str> =
+                    steps.iter().flat_map(|step| [step.from, step.to]).collect();
+                let results = on_common_episodes(played.results, &compared);
+                let played = PlayedEpisodes { results: &results, ..played };
+                let losses = steps.iter().map(|step| step.loss(played)).collect();
+                HelperLosses { helper: (*helper).clone(), losses }
             })
             .collect();
-        let is_known = |task: &TaskId| differences.iter().any(|d| d.tasks.contains_key(task));
-        Ok(Losses { helpers, tasks: TaskId::all().filter(is_known).collect() })
+        let losses = || helpers.iter().flat_map(|helper| &helper.losses);
+        let is_known = |task: &TaskId| losses().any(|loss| loss.tasks.contains_key(task));
+        let tasks = TaskId::all().filter(is_known).collect();
+        Ok(Losses { helpers, tasks })
     }
 
     /// Formats the losses; the text ends with a line break.
     pub fn text(&self, format: Format) -> String {
-        const LEGEND: &str = "Loss of TR against oracle_plan on the same episodes, with 95 % \
-                              intervals over environments.\ntotal = search + inference + \
-                              planning; docs/metrics.md defines them.\n";
+        const LEGEND: &str = "Loss of TR against oracle_plan on the episodes that the helper and its \
+                              references have,\nwith 95 % intervals over environments. total = \
+                              search + inference + planning;\ndocs/metrics.md defines them.\n";
         match format {
             Format::Table => format!("{}\n{LEGEND}", self.table().to_terminal()),
             Format::Markdown => format!("{}\n{LEGEND}", self.table().to_markdown()),
@@ -147,6 +152,19 @@ impl Losses {
     }
 }
 
+/// Returns the results of these helpers on the episodes that all of them have. On other episodes the
+/// losses by cause would not add up.
+fn on_common_episodes(results: &[RunResult], helpers: &BTreeSet<&str>) -> Vec<RunResult> {
+    let of_helpers = || results.iter().filter(move |r| helpers.contains(r.key.helper.as_str()));
+    let mut players: BTreeMap<(TaskId, &str), BTreeSet<&str>> = BTreeMap::new();
+    for RunResult { key, .. } in of_helpers() {
+        players.entry((key.task, &key.episode)).or_default().insert(&key.helper);
+    }
+    let is_common =
+        |r: &&RunResult| players[&(r.key.task, r.key.episode.as_str())].len() == helpers.len();
+    of_helpers().filter(is_common).cloned().collect()
+}
+
 /// Difference of two helpers that one cause explains.
 #[derive(Clone, Copy, Debug)]
 struct Step<'a> {
@@ -157,24 +175,11 @@ struct Step<'a> {
 
 impl Step<'_> {
     /// Returns the mean of `from` − `to`.
-    fn loss(&self, differences: &[Difference]) -> Loss {
-        let find = |helper: &str, baseline: &str| {
-            differences.iter().find(|d| d.helper == helper && d.baseline == baseline)
-        };
-        let (difference, sign) = match find(self.from, self.to) {
-            Some(difference) => (Some(difference), 1.0),
-            None => (find(self.to, self.from), -1.0),
-        };
-        let signed = |i: &Interval| match sign {
-            1.0 => *i,
-            _ => Interval { mean: -i.mean, low: -i.high, high: -i.low, ..*i },
-        };
-        let tasks = difference.map(|d| d.tasks.iter().map(|(t, i)| (*t, signed(i))).collect());
-        Loss {
-            cause: self.cause,
-            all: difference.and_then(|d| d.all.as_ref()).map(signed),
-            tasks: tasks.unwrap_or_default(),
-        }
+    fn loss(&self, played: PlayedEpisodes<'_>) -> Loss {
+        let pair = [self.to, self.from].map(str::to_owned);
+        let difference = differences(played, &pair).pop();
+        let (all, tasks) = difference.map(|d| (d.all, d.tasks)).unwrap_or_default();
+        Loss { cause: self.cause, all, tasks }
     }
 }
 

@@ -100,8 +100,11 @@ pub fn find_trace(
     seed: Option<u32>,
 ) -> Result<PathBuf> {
     let found = find_traces(folder, Some(episode), helper, seed)?;
-    let candidates = found.into_iter().map(|(path, helper)| (preference(&helper), path));
-    if let Some((_, path)) = candidates.min() {
+    // Seeds are compared as numbers. In the order of paths, 10 is before 2.
+    let order = |(path, helper): &(PathBuf, String)| {
+        (preference(helper), path.parent().map(Path::to_owned), seed_of(path).unwrap_or(u32::MAX))
+    };
+    if let Some((path, _)) = found.into_iter().min_by_key(order) {
         return Ok(path);
     }
     let traces = folder.traces()?;
@@ -118,6 +121,11 @@ pub fn find_trace(
     wanted += &helper.map_or(String::new(), |h| format!(" with helper {h}"));
     wanted += &seed.map_or(String::new(), |s| format!(" and seed {s}"));
     Err(EvalError::NoTrace { path: folder.path().to_owned(), wanted, known })
+}
+
+/// Returns the seed in the file name of a trace, `EPISODE-sSEED.jsonl`.
+fn seed_of(path: &Path) -> Option<u32> {
+    path.file_stem()?.to_str()?.rsplit_once("-s")?.1.parse().ok()
 }
 
 /// Renders a trace as a video; returns the number of its frames. Draws masks over the helper's

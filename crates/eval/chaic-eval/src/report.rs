@@ -7,7 +7,7 @@ mod tables;
 mod text_table;
 mod write;
 
-pub use coverage::{coverage, untraced_note};
+pub use coverage::{coverage, untraced_failures, untraced_note};
 pub use figure::write_figure;
 pub use labels::{Labels, RecordedGrants, title};
 pub use tables::{

@@ -4,6 +4,7 @@
 //! run), `traces/`, copies of episode files in `episodes/`, and the report after the run is
 //! finished. `docs/reference/trace.md` describes these files.
 
+mod comparison;
 mod environment;
 mod estimate;
 mod folder;
@@ -16,6 +17,7 @@ mod unique_names;
 mod worker;
 
 pub use crate::episode_file::tasks_of_files;
+pub use comparison::{ComparedRun, check_same_episodes};
 pub use folder::{FolderMode, RunFolder};
 pub(crate) use folder::{PARTNERS_FILE, has_partners};
 pub use granted::RunGrants;
@@ -24,6 +26,7 @@ pub use journal::{Journal, read_results};
 pub(crate) use options::FILES;
 pub use options::{MAX_IMAGE_SIZE, MIN_IMAGE_SIZE, RunOptions, RunRequest};
 pub use plan::{EpisodeJob, environments, planned};
+pub(crate) use shard::reopen_merged;
 pub use shard::{Shard, merge};
 pub use worker::{FinishedJob, JobEvent};
 
@@ -214,7 +217,9 @@ impl Run {
     ) -> Result<bool> {
         let is_done = |r: &&RunResult| r.summary().is_some();
         let done: BTreeSet<&RunKey> = self.results.iter().filter(is_done).map(|r| &r.key).collect();
-        let shard_jobs = self.planned.iter().enumerate().filter(|(k, _)| shard.contains(*k));
+        let n_helpers = self.options.helpers.len();
+        let shard_jobs =
+            self.planned.iter().enumerate().filter(|(k, _)| shard.contains(*k, n_helpers));
         let missing: Vec<EpisodeJob> = shard_jobs
             .map(|(_, job)| job)
             .filter(|job| !done.contains(&job.key))

@@ -19,7 +19,7 @@ use crate::error::{EvalError, Result};
 use crate::metrics::RunResult;
 use crate::run::{
     EpisodeJob, PARTNERS_FILE, Run, RunFolder, RunOptions, has_partners, merge, planned,
-    read_results,
+    read_results, reopen_merged,
 };
 
 /// File names of the robustness report.
@@ -117,10 +117,12 @@ impl SuiteFolder {
     }
 
     /// Merges shards or other parts of the runs with several partners in a new folder, partner by
-    /// partner; an interrupted merge can be repeated. It writes no robustness report.
+    /// partner. Returns the runs of all partners. It writes no robustness report; until there is one,
+    /// an interrupted merge can be repeated.
     ///
     /// # Errors
-    /// If the parts have different partners, and those of [`merge`].
+    /// If the parts have different partners, or the folder has runs of other parts; those of
+    /// [`merge`].
     pub fn merge(out: &Path, parts: &[PathBuf]) -> Result<(SuiteFolder, Vec<Run>)> {
         let folders: Result<Vec<SuiteFolder>> =
             parts.iter().map(|part| SuiteFolder::read(part)).collect();
@@ -138,13 +140,32 @@ impl SuiteFolder {
                 )));
             }
         }
-        let merged = SuiteFolder::start(out, first.suite.clone())?;
+        let merged = SuiteFolder::start_merge(out, first.suite.clone())?;
         let mut runs = Vec::new();
-        for entry in merged.partners().iter().filter(|e| !RunFolder::is_run(&merged.run_path(e))) {
-            let parts: Vec<PathBuf> = folders.iter().map(|folder| folder.run_path(entry)).collect();
-            runs.push(merge(&merged.run_path(entry), &parts)?);
+        for entry in merged.partners() {
+            let parts: Vec<PathBuf> =
+                folders.iter().map(|folder| folder.run_path(&entry)).collect();
+            let path = merged.run_path(&entry);
+            let open = if RunFolder::is_run(&path) { reopen_merged } else { merge };
+            runs.push(open(&path, &parts)?);
         }
         Ok((merged, runs))
+    }
+
+    /// Starts a merge in a new or empty folder, or continues one that was interrupted before it wrote
+    /// the robustness report.
+    fn start_merge(path: &Path, suite: PartnerSuite) -> Result<SuiteFolder> {
+        if !SuiteFolder::is_suite(path) {
+            return SuiteFolder::start(path, suite);
+        }
+        let folder = SuiteFolder::read(path)?;
+        folder.check_partners(&suite)?;
+        for name in REPORT {
+            if kind(&path.join(name))? == EntryKind::Missing {
+                return Ok(folder);
+            }
+        }
+        Err(EvalError::NotEmpty { path: path.to_owned() })
     }
 
     /// Returns the path of the folder.

@@ -40,7 +40,7 @@ pub fn task_rate(played: PlayedEpisodes<'_>, task: TaskId, helper: &str) -> Opti
     let mut episodes = BTreeSet::new();
     for result in played.results.iter().filter(is_selected) {
         let rate = result.summary().map_or(0.0, Summary::rate);
-        let environment = played.environments.get(&result.key.episode);
+        let environment = played.environments.get(task, &result.key.episode);
         all.add(task, environment, rate);
         by_seed.entry(result.key.seed).or_default().add(task, environment, rate);
         episodes.insert(&result.key.episode);

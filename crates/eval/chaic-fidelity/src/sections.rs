@@ -103,7 +103,7 @@ impl RuleSection<'_> {
         let count = |t: &TaskId| {
             let results = self.played.results.iter().filter(|r| r.key.task == *t);
             let environments: BTreeSet<&str> =
-                results.map(|r| self.played.environments.get(&r.key.episode)).collect();
+                results.map(|r| self.played.environments.get(*t, &r.key.episode)).collect();
             format!("{}: {}", t.info().title.to_lowercase(), environments.len())
         };
         self.tasks.iter().map(count).collect::<Vec<_>>().join(", ")

@@ -147,7 +147,8 @@ fn with_true_names(
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tracking {
     pub(crate) tracker: Tracker,
-    /// Tracks in the last image, with one pixel of each.
+    /// Tracks in the last image, with one pixel of each: detected ones, and missed ones at their
+    /// remembered place.
     pub(crate) last: Vec<(TrackId, [u32; 2])>,
 }
 
@@ -174,6 +175,7 @@ impl Tracking {
         self.tracker.mask_held(pose, depth_m, camera, STRIDE, &mut dynamic_mask);
         self.tracker.mask_movables(depth_m, camera, STRIDE, &mut dynamic_mask);
         self.last = detections.iter().map(|d| (d.track, d.pixel)).collect();
+        self.last.extend(self.tracker.missed(frame, depth_m, camera));
         Percepts { detections, dynamic_mask, stride: STRIDE, hands: None }
     }
 

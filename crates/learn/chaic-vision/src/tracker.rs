@@ -130,6 +130,9 @@ impl Measurement {
     }
 }
 
+/// Depths differ by at least this much between the points of an object, meters.
+const MIN_DEPTH_ERROR_M: f32 = 0.05;
+
 /// Tracked object.
 #[derive(Clone, Debug)]
 struct Track {
@@ -213,6 +216,27 @@ impl Tracker {
         self.penalize_missing(now, depth_m, camera);
         detections.sort_by_key(|d| d.track);
         (detections, kinds)
+    }
+
+    /// Returns one pixel of each track that was missed in this image although the depth at its place
+    /// is that of the object. The pixel targets it like a detection.
+    pub fn missed(&self, now: Frame, depth_m: &[f32], camera: &Camera) -> Vec<(TrackId, [u32; 2])> {
+        let size = Vec2::new(camera.width as f32, camera.height as f32);
+        let is_missed = |t: &&Track| {
+            t.last_seen < now && !t.is_carried && !t.is_released && !self.held.contains(&t.id)
+        };
+        let pixel = |track: &Track| {
+            let (px, depth) = camera.project(track.position)?;
+            if px.cmplt(Vec2::ZERO).any() || px.cmpge(size).any() {
+                return None;
+            }
+            let [column, row] = [px.x as u32, px.y as u32];
+            let visible_m = depth_m[row as usize * camera.width as usize + column as usize];
+            let thickness_m = extents_m(track.label).into_iter().fold(f32::MAX, f32::min);
+            let is_there = (visible_m - depth).abs() <= (0.5 * thickness_m).max(MIN_DEPTH_ERROR_M);
+            is_there.then_some((track.id, [column, row]))
+        };
+        self.tracks.iter().filter(is_missed).filter_map(pixel).collect()
     }
 
     /// Lowers the log odds of tracks whose unoccluded place does not show them.

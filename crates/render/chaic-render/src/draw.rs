@@ -302,7 +302,8 @@ impl InstanceDraw<'_> {
         vertices.project_vertices(&mesh.positions, &transform, projection);
         // A plan view has no near plane.
         let nearest = if projection.is_plan { f32::INFINITY } else { 1.0 / projection.near_m() };
-        vertices.cull_backfaces(&mesh.indices, projection, nearest, survivors);
+        let n_vertices = mesh.positions.len();
+        vertices.cull_backfaces(n_vertices, &mesh.indices, projection, nearest, survivors);
         let rows = projection.height as f32;
         let lists = mesh.indices.each_ref().map(|list| &list[..]);
         for batch in survivors.chunks(SETUP_BATCH_SIZE) {

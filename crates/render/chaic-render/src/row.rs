@@ -11,7 +11,7 @@ use crate::projection::{clamp_depth_m, reciprocal};
 use crate::raster::{Block32, Blocks, LANES};
 use crate::segments::{TexelLine, TexturePlacement};
 use crate::setup::{TWO_POW_23, fmax, fmin};
-use crate::texture::{Atlas, N_ATLAS};
+use crate::texture::{Atlas, N_ATLAS, Tile};
 
 /// A row of pixels; each array has at least [`LANES`] elements more than the row has pixels.
 #[derive(Default)]
@@ -111,7 +111,11 @@ impl Row {
         let depth = &depth[lanes.clone()];
         let (brightness, colors) = (&mut brightness[lanes.clone()], &mut colors[lanes.clone()]);
         ids[lanes].fill(style.id);
-        sample_texture(brightness, depth, &style.placement, atlas);
+        if Tile::is_plain(style.placement.begin) {
+            brightness.fill(1.0);
+        } else {
+            sample_texture(brightness, depth, &style.placement, atlas);
+        }
         if let Some(GroundShadow { quads, x, z }) = ground {
             apply_ground_shadow(brightness, depth, quads, [x, z]);
         }

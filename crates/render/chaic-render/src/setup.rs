@@ -79,10 +79,38 @@ impl ScreenVertices {
         (q > 0.0) & (q <= nearest)
     }
 
+    /// Returns whether the first `n` vertices are in front of the camera and not beyond the inverse
+    /// depth `nearest`.
+    #[inline(always)]
+    fn are_beyond_near_plane(&self, n: usize, nearest: f32) -> bool {
+        let mut all = true;
+        for q in &self.q[..n.min(N_VERTICES)] {
+            all &= (*q > 0.0) & (*q <= nearest);
+        }
+        all
+    }
+
     /// Collects the triangles that face the camera, may cover a pixel center of the image, and have
-    /// no vertex nearer than `nearest`.
+    /// no vertex nearer than `nearest`. The mesh has `n_vertices` vertices.
     #[inline(always)]
     pub fn cull_backfaces(
+        &self,
+        n_vertices: usize,
+        vertices: &[Vec<u16>; 3],
+        projection: &Projection,
+        nearest: f32,
+        survivors: &mut Vec<u32>,
+    ) {
+        // Few meshes reach the near plane. The others need no test for each triangle.
+        if self.are_beyond_near_plane(n_vertices, nearest) {
+            self.cull::<false>(vertices, projection, nearest, survivors);
+        } else {
+            self.cull::<true>(vertices, projection, nearest, survivors);
+        }
+    }
+
+    #[inline(always)]
+    fn cull<const CHECKS_NEAR_PLANE: bool>(
         &self,
         vertices: &[Vec<u16>; 3],
         projection: &Projection,
@@ -104,8 +132,11 @@ impl ScreenVertices {
             let end = first_center(fmax(fmax(au, bu), cu) + 0.01, columns);
             let top = first_center(fmin(fmin(av, bv), cv), rows);
             let bottom = first_center(fmax(fmax(av, bv), cv), rows);
-            let (nearer, farther) = (fmax(fmax(q[a], q[b]), q[c]), fmin(fmin(q[a], q[b]), q[c]));
-            let is_in_front = (farther > 0.0) & (nearer <= nearest);
+            let is_in_front = !CHECKS_NEAR_PLANE || {
+                let nearer = fmax(fmax(q[a], q[b]), q[c]);
+                let farther = fmin(fmin(q[a], q[b]), q[c]);
+                (farther > 0.0) & (nearer <= nearest)
+            };
             // Rows run downward, so counter-clockwise triangles have negative area here.
             survivors[k] = u32::from((area < 0.0) & (begin < end) & (top < bottom) & is_in_front);
         }

@@ -79,6 +79,12 @@ impl Tile {
         Tile { begin: begin as u32, texels_per_m: TILE_SIDE as f32 / texture.period_m() }
     }
 
+    /// Returns whether a texel belongs to the tile of [`Texture::Plain`], which has brightness 1.
+    #[inline(always)]
+    pub fn is_plain(texel: u32) -> bool {
+        texel < N_TILE as u32
+    }
+
     /// Returns the number of texels before a mip level: the sum of the first terms of 4^n, 4^(n-1),
     /// ...
     #[inline(always)]

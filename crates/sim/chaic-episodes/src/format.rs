@@ -64,7 +64,7 @@ struct EpisodeFile {
     version: u32,
     /// Name of the episode, for example `obstacle/test/07`.
     id: String,
-    /// Split that the episode belongs to: `train`, `test`, `generated`, or any other word.
+    /// Split that the episode belongs to: `train`, `test`, `standard`, `generated`, or any other word.
     split: String,
     /// Generator that made it, if any.
     generator: Option<GeneratorInfo>,

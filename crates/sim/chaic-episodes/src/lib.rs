@@ -41,7 +41,7 @@ pub use attempts::GenerateError;
 pub use bundled::{Bundled, regenerate_bundled};
 pub use format::{Episode, EpisodeError, GeneratorInfo, MAX_EPISODE_BYTES, json_schema};
 pub use generate::{generate, generate_episode, generate_with};
-pub use lookup::{episodes, find_episode};
+pub use lookup::{environment_of_changed, episodes, find_episode};
 pub use seeds::{
     BUNDLED_PER_TASK, DatasetSplit, GeneratorSeeds, SEED_RANGES, STANDARD_PER_TASK, SeedPurpose,
     SeedRange,

@@ -1,11 +1,12 @@
 //! Episodes by split and by name.
 
 use chaic_core::TaskId;
+use chaic_core::capability::PersonChange;
 
 use crate::Settings;
 use crate::bundled::{bundled_test, bundled_train};
 use crate::format::Episode;
-use crate::generate::generate_episode;
+use crate::generate::{generate_episode, generator_info};
 use crate::seeds::{FIRST_BUNDLED_SEED, GeneratorSeeds};
 use crate::split::{Split, SplitError};
 use crate::standard::standard;
@@ -56,6 +57,33 @@ pub fn find_episode(id: &str) -> Result<Episode, SplitError> {
         }
         _ => Err(no_such()),
     }
+}
+
+/// Returns [`GeneratorInfo::environment`](crate::GeneratorInfo::environment) of an episode with a
+/// [changed partner](Episode::with_partner), which has no generator information. Name and seed
+/// identify the episode that was changed.
+///
+/// Returns `None` if the partner was not changed, or [`find_episode`] does not know the name.
+pub fn environment_of_changed(episode: &Episode) -> Option<String> {
+    let (name, change) = episode.id().rsplit_once('/')?;
+    change.parse::<PersonChange>().ok()?;
+    let parts: Vec<&str> = name.split('/').collect();
+    let [task, split, number] = parts[..] else { return None };
+    let number: u64 = number.parse().ok()?;
+    let (split, k) = match split {
+        "train" => (Split::Train, number),
+        "test" => (Split::Test, number),
+        "standard" => (Split::Standard, number),
+        "gen" if number < FIRST_BUNDLED_SEED => (Split::Generated(number..number + 1), 0),
+        "gen-standard" if number < FIRST_BUNDLED_SEED => {
+            (Split::GeneratedStandard(number..number + 1), 0)
+        }
+        _ => return None,
+    };
+    let is_same = task == episode.task().name() && k < split.len_of(episode.task()) as u64;
+    let seeds = is_same.then(|| split.seeds(episode.task(), k))?;
+    let info = generator_info(episode.task(), seeds, split.settings());
+    (seeds.episode == episode.seed()).then(|| info.environment())
 }
 
 fn generated(task: TaskId, seed: u64, settings: Settings) -> Result<Episode, SplitError> {

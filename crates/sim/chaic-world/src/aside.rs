@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use chaic_core::capability::Capability;
-use chaic_core::geom::{math, to_xz};
+use chaic_core::geom::{horizontal_distance, math, to_xz};
 use chaic_core::{AgentId, EntityId, Vec2, Vec3};
 
 use crate::collide::Body;
@@ -21,6 +21,8 @@ const CELL_M: f32 = 0.125;
 const HALF: i32 = 24;
 /// Number of cells per row of the grid.
 const SIDE: i32 = 2 * HALF + 1;
+/// Small objects whose position is higher than this do not lie on the floor, meters.
+const SMALL_OBJECT_M: f32 = 0.3;
 /// Maximum number of cells that may be cut off: corners without relevance.
 const MAX_CUT_OFF_CELLS: usize = 8;
 
@@ -41,6 +43,7 @@ impl World {
         let spots = spots.map(|spot| Vec3::new(spot.x, 0.0, spot.y));
         let free = |spot: &Vec3| {
             self.is_free_floor(obstacle, *spot)
+                && self.has_no_small_object(*spot, radius)
                 && self.is_open_between(middle, to_xz(*spot), size.y)
         };
         let with_opening_distance =
@@ -50,7 +53,8 @@ impl World {
         let initial = self.object(obstacle).0.position;
         let is_clear_of_agents =
             |p| self.discs().iter().all(|d| d.center.distance(to_xz(p)) > d.radius_m + radius);
-        if is_clear_of_agents(initial) && self.is_free_for(obstacle, initial, radius) {
+        let is_near = to_xz(initial).distance(middle) <= self.rules.reach_limit_m + radius;
+        if is_near && is_clear_of_agents(initial) && self.is_free_for(obstacle, initial, radius) {
             spots.push(with_opening_distance(initial));
         }
         let spaces: Vec<_> =
@@ -66,6 +70,18 @@ impl World {
             }
         }
         best.map_or_else(|| self.floor_spot_beside(agent, obstacle), |(_, spot)| spot)
+    }
+
+    /// Returns whether no small object lies on the floor within `radius_m` of a spot.
+    fn has_no_small_object(&self, spot: Vec3, radius_m: f32) -> bool {
+        self.setup.entities().all(|e| {
+            let (spec, state) = self.object(e);
+            let lies_on_floor = state.is_resting()
+                && spec.class.info().is_carriable()
+                && (state.position.y - spot.y).abs() < SMALL_OBJECT_M;
+            let clear_m = radius_m + spec.half_longer_side_m();
+            !lies_on_floor || horizontal_distance(state.position, spot) > clear_m
+        })
     }
 
     /// Returns whether no wall or other fixed object is between two points, up to this height.

@@ -67,7 +67,7 @@ pub struct Room {
     pub rect: Rect,
 }
 
-/// A straight wall, solid from floor to `height_m`.
+/// A straight wall, solid from `bottom_m` to `top_m`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Wall {

@@ -130,8 +130,8 @@ pub struct AgentState {
     pub progress: LastProgress,
 }
 
-/// An agent without progress for this number of frames is stuck. Our choice: twice the length of
-/// the longest action other than waiting for another agent.
+/// An agent without progress for this number of frames is stuck. Our choice: longer than
+/// any action other than waiting for another agent.
 pub const STUCK_AFTER_FRAMES: Frame = 200;
 /// A move of more than this distance from the position of the last progress is progress, meters.
 /// Our choice: more than one step, so that stepping back and forth is none.

@@ -92,7 +92,7 @@ impl World {
             .is_some_and(|(_, action, o)| is_put_on(action) && o.is_success());
         person.activity = None;
         person.last = Some((action, outcome));
-        if !action.is_locomotion() && !matches!(action, Action::Wait { .. }) {
+        if action.is_interaction() {
             person.last_interaction = Some((frame, action, outcome));
             let is_beyond_limits = outcome == Outcome::Failure(FailureReason::BeyondLimits);
             if outcome.is_success() || is_beyond_limits {
@@ -322,8 +322,14 @@ impl World {
                 object.rotation = rotation;
             }
             if path.is_empty() {
-                object.location = ObjectLocation::Resting { on: *on };
-                self.check_delivery(crate::Setup::entity(i));
+                let (entity, on) = (crate::Setup::entity(i), *on);
+                object.location = ObjectLocation::Resting { on };
+                // Someone may have taken the support during the fall.
+                if on.is_some_and(|support| self.object(support).1.holder().is_some()) {
+                    self.start_fall(&[entity]);
+                } else {
+                    self.check_delivery(entity);
+                }
             }
         }
     }

@@ -165,7 +165,7 @@ impl World {
 
     fn observed_action(&self, agent: AgentId) -> Option<ObservedAction> {
         let person = self.person(agent);
-        if let Some(activity) = person.activity.as_ref().filter(|a| a.action.subject().is_some()) {
+        if let Some(activity) = person.activity.as_ref().filter(|a| a.action.is_interaction()) {
             let (frame, action) = (activity.since, activity.action);
             return Some(ObservedAction { agent, frame, action, outcome: None });
         }

@@ -74,7 +74,12 @@ impl World {
     pub fn new(setup: impl Into<Arc<Setup>>, rules: Rules) -> Result<World, SetupError> {
         let setup = setup.into();
         setup.check()?;
-        let fixed = setup.things.iter().enumerate().filter(|(_, t)| t.fixed);
+        let mut state = initial_state(&setup);
+        attach_vehicles(&setup, &mut state);
+        // A vehicle moves with its rider, and blocks nothing.
+        let blocks_where_it_stands =
+            |i: usize, t: &ObjectSpec| t.fixed && state.objects[i].holder().is_none();
+        let fixed = setup.things.iter().enumerate().filter(|(i, t)| blocks_where_it_stands(*i, t));
         let blocks = wall_blocks(&setup)
             .chain(fixed.flat_map(|(i, t)| blocks_at(t, Setup::entity(i), t.position, t.yaw_rad)))
             .collect();
@@ -89,12 +94,10 @@ impl World {
             .filter(|(_, t)| blocks_bodies(t))
             .map(|(i, _)| i)
             .collect();
-        let state = initial_state(&setup);
         let capabilities = setup.people.iter().map(AgentSpec::capability).collect();
         let events = Vec::new();
         let mut world =
             World { setup, rules, block_index, movable_blockers, capabilities, state, events };
-        world.attach_vehicles();
         world.update_carried_objects();
         Ok(world)
     }
@@ -360,27 +363,24 @@ impl World {
         let middle = state.position.y + (state.rotation * (Vec3::Y * half.y)).y;
         middle + m.x_axis.y.abs() * half.x + m.y_axis.y.abs() * half.y + m.z_axis.y.abs() * half.z
     }
+}
 
-    /// Puts the nearest free vehicle into the left hand of every rider.
-    fn attach_vehicles(&mut self) {
-        for agent in self.setup.agents() {
-            if self.capability(agent).gait != Gait::WalkBike {
-                continue;
-            }
-            let at = self.person(agent).pose.position;
-            let free = |e: &EntityId| {
-                self.object(*e).0.class.info().role == Role::Vehicle
-                    && self.object(*e).1.holder().is_none()
-            };
-            let nearest = self.setup.entities().filter(free).min_by(|a, b| {
-                let d = |e: &EntityId| horizontal_distance(self.object(*e).1.position, at);
-                d(a).total_cmp(&d(b))
-            });
-            if let Some(vehicle) = nearest {
-                self.object_mut(vehicle).location =
-                    ObjectLocation::Held { by: agent, hand: Hand::Left };
-                self.person_mut(agent).hands[Hand::Left.index()] = Some(vehicle);
-            }
+/// Puts the nearest free vehicle into the left hand of every rider.
+fn attach_vehicles(setup: &Setup, state: &mut State) {
+    for (agent, spec) in setup.agents().zip(&setup.people) {
+        if spec.capability().gait != Gait::WalkBike {
+            continue;
+        }
+        let at = state.agents[agent.index()].pose.position;
+        let is_free = |(i, t): &(usize, &ObjectSpec)| {
+            t.class.info().role == Role::Vehicle && state.objects[*i].holder().is_none()
+        };
+        let distance = |i: usize| horizontal_distance(state.objects[i].position, at);
+        let vehicles = setup.things.iter().enumerate().filter(is_free).map(|(i, _)| i);
+        if let Some(nearest) = vehicles.min_by(|a, b| distance(*a).total_cmp(&distance(*b))) {
+            let hand = Hand::Left;
+            state.objects[nearest].location = ObjectLocation::Held { by: agent, hand };
+            state.agents[agent.index()].hands[hand.index()] = Some(Setup::entity(nearest));
         }
     }
 }

@@ -219,6 +219,13 @@ impl GoalBelief {
         }
     }
 
+    /// Returns the probability that at least one object of this class is wanted, given the target
+    /// set.
+    pub fn probability_wanted_given(&self, set: TargetSet, class: ClassId) -> f32 {
+        let of_set = self.sum(|h| h.set == set);
+        self.sum(|h| h.set == set && h.count(class) > 0.0) / of_set.max(f32::MIN_POSITIVE)
+    }
+
     /// Returns the expected number of wanted objects of this class that are neither delivered nor
     /// held by the partner.
     pub fn expected_missing(&self, class: ClassId) -> f32 {

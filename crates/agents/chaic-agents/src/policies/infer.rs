@@ -41,17 +41,23 @@ impl InferOptions {
         InferOptions { follows_partner: true, infers_constraint: true, uses_team_planner: true };
 }
 
-/// Constants of the policy, all ours; chosen on episodes of `gen-standard:7000..7010`.
+/// Constants of the policy, all ours; chosen on episodes of `gen-standard:7000..7010` and
+/// `gen-standard:8100..8140`.
 mod constants {
     use chaic_core::Frame;
 
     /// Probability of the most likely target set from which the helper acts on it.
     pub const IDENTIFIED_PROBABILITY: f32 = 0.7;
+    /// The same late in the episode, when there is no time to wait for evidence.
+    pub const LATE_PROBABILITY: f32 = 0.25;
+    /// Fractions of the episode between which the probability falls linearly.
+    pub const LATE_FRACTIONS: [f32; 2] = [0.2, 0.5];
     /// Time after a sighting for which the helper follows the partner while the goal is unclear,
     /// frames. Later it explores, which finds the partner sooner.
     pub const LOST_FRAMES: Frame = 200;
-    /// Goals with a lower probability are left out of the plan.
-    pub const MIN_GOAL_PROBABILITY: f32 = 0.04;
+    /// Goals with a lower probability are left out of the plan: to explore is better than to fetch
+    /// objects that are probably unwanted.
+    pub const MIN_GOAL_PROBABILITY: f32 = 0.15;
     /// Probability from which a class outside the target set counts as wanted.
     pub const MIN_EXTRA_PROBABILITY: f32 = 0.5;
     /// Number of objects assumed for each class of a target set: more than any episode has.
@@ -148,7 +154,8 @@ impl InferPolicy {
                 if info.sets.contains(&set) {
                     return Some((*class, ASSUMED_OBJECTS_PER_CLASS));
                 }
-                let is_likely = belief.goal.probability_wanted(*class) >= MIN_EXTRA_PROBABILITY;
+                let wanted = belief.goal.probability_wanted_given(set, *class);
+                let is_likely = wanted >= MIN_EXTRA_PROBABILITY;
                 let n = if info.role == Role::Fragile { 2.0 } else { 1.0 };
                 is_likely.then_some((*class, n))
             });
@@ -161,11 +168,13 @@ impl InferPolicy {
 
     /// Returns whether the goal is clear enough to act on it, and notes when it became so.
     fn check_goal(&mut self, context: &Context<'_>) -> bool {
+        let fraction = context.memory.frame as f32 / context.briefing.horizon as f32;
+        let [early, late] = LATE_FRACTIONS;
+        let lateness = ((fraction - early) / (late - early)).clamp(0.0, 1.0);
+        let required =
+            IDENTIFIED_PROBABILITY + lateness * (LATE_PROBABILITY - IDENTIFIED_PROBABILITY);
         let is_clear = context.briefing.goal.is_some()
-            || self
-                .belief
-                .as_ref()
-                .is_some_and(|belief| belief.goal.most_likely().1 >= IDENTIFIED_PROBABILITY);
+            || self.belief.as_ref().is_some_and(|belief| belief.goal.most_likely().1 >= required);
         if is_clear && self.identified.is_none() {
             self.identified = Some(context.memory.frame);
         }

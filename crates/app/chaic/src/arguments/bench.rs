@@ -22,7 +22,7 @@ pub enum SceneCommand {
 pub struct SceneArguments {
     /// Id of the episode, for example obstacle/test/00, or an episode file.
     pub episode: String,
-    /// File to write: .glb.
+    /// File to write, for example scene.glb.
     #[arg(long, value_name = "FILE", value_parser = glb_file)]
     pub out: PathBuf,
     /// Level of detail, 0 to 6; 6 is the finest.
@@ -193,7 +193,7 @@ pub struct DurationArguments {
 pub struct SceneBenchArguments {
     #[command(flatten)]
     pub scene: SceneChoice,
-    /// Folder for the files.
+    /// Folder for the files, for example my_files.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
 }

@@ -35,7 +35,7 @@ pub struct SubmitPackArguments {
     /// Folder with submission.toml, helper/ and public/.
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
-    /// Archive to write, .tar.
+    /// Archive to write, for example submission.tar.
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
 }
@@ -60,7 +60,7 @@ pub struct SubmitRunArguments {
     /// Folder of the sealed episodes (*.json).
     #[arg(long, value_name = "DIR")]
     pub episodes: PathBuf,
-    /// Folder for the submission, its run and its score.
+    /// Folder, for example results/mine, for the submission, its run and its score.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     /// Play the helper rhp too, as the reference of differences.
@@ -77,7 +77,7 @@ pub struct SubmitScoreArguments {
     /// Folder of `chaic submit run`.
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
-    /// Score to write [default: score.json in the folder].
+    /// Score to write, for example score.json [default: score.json in the folder].
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
 }
@@ -114,7 +114,7 @@ pub struct LeaderboardBuildArguments {
     /// Folder with a folder of `chaic submit run` for each submission.
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
-    /// Page to write, .html. The values are beside it, as .json and .csv.
+    /// Page to write, for example page.html, with the values beside it as .json and .csv.
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
     /// Title of the page.

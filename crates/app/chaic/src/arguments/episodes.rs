@@ -14,7 +14,7 @@ use super::{Tasks, seed_range, task, tasks};
 pub enum EpisodesCommand {
     /// List the episodes of a split.
     List {
-        /// Episodes: test, train, standard, gen:A..B or gen-standard:A..B.
+        /// Split of episodes: test, train, standard, gen:A..B or gen-standard:A..B, for example gen:0..100.
         #[arg(long, default_value = "test")]
         split: Split,
         /// Tasks, separated by commas, or `all`.
@@ -25,7 +25,7 @@ pub enum EpisodesCommand {
     Show {
         /// Id of the episode, for example obstacle/test/00, or an episode file.
         episode: String,
-        /// Image to write: .png.
+        /// Image to write, for example plan.png.
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
         /// Width of the image, 64 to 8192 pixels.
@@ -37,14 +37,14 @@ pub enum EpisodesCommand {
         /// Task of the episodes.
         #[arg(long, value_parser = task)]
         task: TaskId,
-        /// Seeds A..B: short for --split gen:A..B.
+        /// Seeds from A to below B, for example 0..100; short for --split gen:A..B.
         #[arg(long, value_name = "A..B", value_parser = seed_range)]
         #[arg(conflicts_with = "split", required_unless_present = "split")]
         seeds: Option<Range<u64>>,
-        /// Split: standard, gen:A..B, gen-standard:A..B, test or train.
+        /// Split to generate: standard, gen:A..B, gen-standard:A..B, test or train, for example gen:0..100.
         #[arg(long)]
         split: Option<Split>,
-        /// Folder for the files.
+        /// Folder for the files, for example my_episodes.
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
     },
@@ -57,7 +57,7 @@ pub enum EpisodesCommand {
         /// Episode files.
         #[arg(required_unless_present = "split", conflicts_with = "split")]
         files: Vec<PathBuf>,
-        /// Check a split instead. The episodes of standard must also have their committed digests.
+        /// Check a split instead, for example standard, whose episodes must also have their committed digests.
         #[arg(long)]
         split: Option<Split>,
     },
@@ -75,7 +75,8 @@ pub enum EpisodesCommand {
         /// Partners to draw from the secret, 0 to 100; they are written to partners.json, for --partners.
         #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=100))]
         n_partners: u8,
-        /// Folder for commitment.json, which you publish, and the folder `episodes`, which you do not.
+        /// Folder, for example sealed, for commitment.json, which you publish, and the folder `episodes`, which
+        /// you do not.
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
     },
@@ -87,7 +88,7 @@ pub enum EpisodesCommand {
         /// The published commitment.json.
         #[arg(long, value_name = "FILE")]
         commitment: PathBuf,
-        /// Folder for the episode files.
+        /// Folder for the episode files, for example opened.
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
         /// File for the partners of the split, if it has any.
@@ -114,10 +115,10 @@ pub struct OriginalArguments {
     /// The unpacked tdw Python package, version 1.12.27.x, or the folder that contains it.
     #[arg(long, value_name = "DIR")]
     pub tdw: PathBuf,
-    /// Folder for the episode files.
+    /// Folder for the episode files, for example imported.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Import one half only [default: every half that is there].
+    /// Import one half only, for example test [default: every half that is there].
     #[arg(long, value_name = "HALF")]
     pub split: Option<ImportHalf>,
     /// Skip episodes that cannot be imported and list them; the exit code is 1 if any was skipped.

@@ -50,10 +50,12 @@ pub struct EvalArguments {
     /// [default: none,random,rhp,oracle].
     #[arg(long, alias = "helpers", value_name = "NAMES", value_parser = helpers)]
     pub helper: Option<Vec<HelperList>>,
-    /// Episodes: test, train, standard, gen:A..B or gen-standard:A..B [default: test].
+    /// Split of episodes: test, train, standard, gen:A..B or gen-standard:A..B, for example gen:0..100
+    /// [default: test].
     #[arg(long)]
     pub split: Option<Split>,
-    /// Play the episode files (*.json) of this folder instead of a split.
+    /// Play the episode files (*.json) of this folder instead of a split, in the order of their ids as text:
+    /// gen/10 is before gen/2.
     #[arg(long, value_name = "DIR")]
     pub episodes: Option<PathBuf>,
     /// Only the first N episodes of each task, 1 to 1000000.
@@ -66,7 +68,7 @@ pub struct EvalArguments {
     /// Change one rule; repeatable. VALUE may be paper or compat; `chaic list rules` prints the rules.
     #[arg(long, value_name = "NAME=VALUE")]
     pub set: Vec<String>,
-    /// Seeds per episode, 1 to 10000; the first is the episode's own [default: 1].
+    /// Number of seeds per episode, 1 to 10000, for example 5; the first is the episode's own [default: 1].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(ranges::SEEDS))]
     pub seeds: Option<u32>,
     /// Side of all images in pixels, 16 to 2048 [default: 512, or as each agent requests].
@@ -90,8 +92,8 @@ pub struct EvalArguments {
     /// the same [default: canonical].
     #[arg(long, value_name = "APPEARANCE")]
     pub appearance: Option<Appearance>,
-    /// Track: unrestricted allows all grants. hidden limits helpers to images, their own body and goal_place,
-    /// requires learned perception and behavior, and refuses rules that disclose hidden state;
+    /// Track, for example hidden: unrestricted allows all grants; hidden limits helpers to images, their own body
+    /// and goal_place, requires learned perception and behavior, and refuses rules that disclose hidden state;
     /// docs/grants.md [default: unrestricted].
     #[arg(long, value_name = "NAME")]
     pub track: Option<Track>,
@@ -103,7 +105,7 @@ pub struct EvalArguments {
     /// or learned:FILE [default: gt].
     #[arg(long, value_name = "KIND")]
     pub behavior: Option<String>,
-    /// Folder of the run [default: the next free runs/NAME].
+    /// Folder of the run, for example runs/first [default: the next free runs/NAME].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Continue the run in --out with its recorded options.
@@ -112,8 +114,8 @@ pub struct EvalArguments {
     /// Write results without traces: less disk space, but no `chaic verify` and no `chaic replay`.
     #[arg(long)]
     pub no_traces: bool,
-    /// Play part I of N parts, for example 2/4: every fourth episode run from the second on. Each part
-    /// needs an --out of its own; `chaic merge` joins them.
+    /// Play part I of N parts, for example 2/4: every fourth episode from the second on, with all helpers.
+    /// Each seed counts as an episode. Each part needs an --out of its own; `chaic merge` joins them.
     #[arg(long, value_name = "I/N")]
     pub shard: Option<Shard>,
     #[command(flatten)]

@@ -20,13 +20,13 @@ pub enum ExportCommand {
 /// `chaic export episodes`.
 #[derive(Args, Debug)]
 pub struct EpisodesArguments {
-    /// Split: standard, gen:A..B, gen-standard:A..B, test or train.
+    /// Split to export: standard, gen:A..B, gen-standard:A..B, test or train, for example gen:0..100.
     #[arg(long, value_name = "SPLIT")]
     pub split: Split,
     /// Tasks, separated by commas, or `all`.
     #[arg(long, alias = "tasks", value_name = "NAMES", value_parser = tasks, default_value = "all")]
     pub task: Tasks,
-    /// An empty folder for the data set.
+    /// An empty folder for the data set, for example my_data.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
 }
@@ -36,7 +36,7 @@ pub struct EpisodesArguments {
 pub struct LeRobotArguments {
     /// Folder of a run with traces.
     pub run: PathBuf,
-    /// An empty folder for the data set.
+    /// An empty folder for the data set, for example my_data.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     /// Agent whose observations and actions are exported: partner or helper.

@@ -12,7 +12,8 @@ pub struct FidelityArguments {
     /// Folder of episode files (*.json), for example from `chaic import original`.
     #[arg(long, value_name = "DIR")]
     pub episodes: Option<PathBuf>,
-    /// Folder of all runs: `paper`, `compat` and `switch/RULE`, each written as by `chaic eval`.
+    /// Folder of all runs, for example runs/fidelity: `paper`, `compat` and `switch/RULE`, each written as by
+    /// `chaic eval`.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     /// Tasks, separated by commas, or `all` [default: those that have episodes].
@@ -26,7 +27,7 @@ pub struct FidelityArguments {
     #[arg(long, alias = "first", value_name = "N")]
     #[arg(value_parser = clap::value_parser!(u32).range(ranges::N_EPISODES))]
     pub n_episodes: Option<u32>,
-    /// Seeds per episode with both rule sets, 1 to 10000 [default: 5].
+    /// Number of seeds per episode with both rule sets, 1 to 10000, for example 10 [default: 5].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(ranges::SEEDS))]
     pub seeds: Option<u32>,
     /// Rules to switch one at a time from compat to paper, separated by commas, or `all` that differ

@@ -10,7 +10,7 @@ use super::examples::examples;
 /// Headings of `chaic --help` with their commands. Hidden commands have no group.
 pub(super) const GROUPS: [(&str, &[&str]); 6] = [
     ("Play", &["eval", "merge", "play", "study", "episodes", "import", "helper", "llm"]),
-    ("Look", &["report", "show", "list", "explain", "replay", "view", "render", "scene"]),
+    ("Inspect", &["report", "show", "list", "explain", "replay", "view", "render", "scene"]),
     ("Learn", &["collect", "train", "export"]),
     ("Check", &["verify", "fidelity", "bench", "doctor"]),
     ("Contest", &["submit", "leaderboard"]),

@@ -12,7 +12,7 @@ use super::{LanguageArguments, agent, ranges};
 pub enum LlmCommand {
     /// Write the prompt templates into a folder for editing.
     Templates {
-        /// An empty folder.
+        /// An empty folder for the templates, for example templates.
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
     },

@@ -9,10 +9,10 @@ use super::{SplitArgument, ranges};
 /// `chaic collect opponent`.
 #[derive(Args, Debug)]
 pub struct CollectOpponentArguments {
-    /// File to write: .safetensors.
+    /// File to write, for example windows.safetensors.
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
-    /// Part of the training data.
+    /// Part of the training data, for example validation.
     #[arg(long, alias = "of", value_enum, default_value_t = SplitArgument::Train)]
     pub split: SplitArgument,
     #[command(flatten)]

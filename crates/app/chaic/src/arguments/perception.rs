@@ -31,7 +31,7 @@ pub enum TrainCommand {
 /// Options of all trainings.
 #[derive(Args, Debug)]
 pub struct TrainArguments {
-    /// Folder of the training: configuration, checkpoint, curves, weights.
+    /// Folder of the training, for example runs/ppo: configuration, checkpoint, curves, weights.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     /// TOML file with the keys that differ from the default. The config.toml of any training has all keys.
@@ -67,14 +67,14 @@ pub enum CollectCommand {
 /// `chaic collect detection`.
 #[derive(Args, Debug)]
 pub struct CollectDetectionArguments {
-    /// An empty folder for images, depth, annotations.json and statistics.json.
+    /// An empty folder, for example views, for images, depth, annotations.json and statistics.json.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     /// Number of views, 1 to 999999.
     #[arg(long, value_name = "N", default_value_t = 1000)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=999_999))]
     pub views: u32,
-    /// Part of the training data.
+    /// Part of the training data, for example validation.
     #[arg(long, alias = "of", value_enum, default_value_t = SplitArgument::Train)]
     pub split: SplitArgument,
     /// Kind of scenes.
@@ -91,10 +91,10 @@ pub struct CollectDetectionArguments {
 /// `chaic collect behavior`.
 #[derive(Args, Debug)]
 pub struct CollectBehaviorArguments {
-    /// A new folder, or one with clips of the same configuration, which is continued.
+    /// A new folder, for example clips, or one with clips of the same configuration, which is continued.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Part of the training data.
+    /// Part of the training data, for example validation.
     #[arg(long, alias = "of", value_enum, default_value_t = SplitArgument::Train)]
     pub split: SplitArgument,
     #[command(flatten)]

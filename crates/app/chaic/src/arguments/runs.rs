@@ -16,7 +16,7 @@ pub struct MergeArguments {
     /// Folders of the shards.
     #[arg(required = true)]
     pub runs: Vec<PathBuf>,
-    /// A new folder for the whole run.
+    /// A new folder for the whole run, for example runs/standard.
     #[arg(long)]
     pub out: PathBuf,
 }
@@ -85,7 +85,7 @@ pub struct ReplayArguments {
     pub run: PathBuf,
     /// Id of the episode, for example obstacle/test/00.
     pub episode: String,
-    /// Video to write: .mp4 or .gif.
+    /// Video to write, .mp4 or .gif, for example replay.mp4.
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
     /// Helper of the episode run [default: your own helper, or else infer, rhp, oracle ...].
@@ -112,7 +112,7 @@ pub struct ViewArguments {
     pub run: PathBuf,
     /// Id of the episode, for example obstacle/test/00 [default: all, at most --max].
     pub episode: Option<String>,
-    /// Page to write [default: view.html in the folder of the run].
+    /// Page to write, for example page.html [default: view.html in the folder of the run].
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
     /// Only replays of this helper.
@@ -134,8 +134,8 @@ pub struct RenderArguments {
     /// Frame, 0 to 1000000; the next frame with a decision is rendered.
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(ranges::FRAME))]
     pub frame: u32,
-    /// Folder for rgb.png, depth.png (16 bit, millimeters), ids.png (16 bit) and ids.json, classes.png
-    /// and classes.json, normals.png (in world coordinates), and plan.png.
+    /// Folder, for example frame, for rgb.png, depth.png (16 bit, millimeters), ids.png (16 bit) and ids.json,
+    /// classes.png and classes.json, normals.png (in world coordinates), and plan.png.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     /// Side of the images, 16 to 4096 pixels.
@@ -162,7 +162,7 @@ pub struct PlayArguments {
     /// Ids of the episodes, for example obstacle/test/00 or shopping/gen/7 [default: the first test
     /// episode of each of the eight tasks].
     pub episodes: Vec<String>,
-    /// Page to write.
+    /// Page to write, for example game.html.
     #[arg(long, value_name = "FILE", default_value = "play.html")]
     pub out: PathBuf,
 }

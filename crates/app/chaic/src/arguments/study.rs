@@ -53,7 +53,7 @@ pub struct StudyCheckArguments {
 pub struct StudyBuildArguments {
     /// Definition of the study.
     pub study: PathBuf,
-    /// Page to write.
+    /// Page to write, for example my_study.html.
     #[arg(long, value_name = "FILE", default_value = "study.html")]
     pub out: PathBuf,
 }
@@ -89,7 +89,7 @@ pub struct StudyExportArguments {
     /// Definition of the study, the one from which the page was built.
     #[arg(long, value_name = "FILE")]
     pub study: PathBuf,
-    /// An empty folder for the data set.
+    /// An empty folder for the data set, for example my_data.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     /// Also write the verified episodes as a LeRobot data set, without practice.

@@ -7,8 +7,10 @@ use chaic_eval::EvalError;
 use chaic_eval::calibration::read_scores;
 use chaic_eval::losses::Losses;
 use chaic_eval::metrics::{FormulaSet, RunResult, tally};
-use chaic_eval::report::{Format, Report, untraced_note, write_figure};
-use chaic_eval::run::{EpisodeJob, RunFolder, RunOptions, planned, read_results};
+use chaic_eval::report::{Format, Report, untraced_failures, untraced_note, write_figure};
+use chaic_eval::run::{
+    ComparedRun, EpisodeJob, RunFolder, RunOptions, check_same_episodes, planned, read_results,
+};
 use chaic_eval::suite::{Robustness, SuiteFolder};
 
 use crate::arguments::ReportArguments;
@@ -49,10 +51,13 @@ pub fn run(arguments: &ReportArguments, format: OutputFormat) -> Result<ExitStat
     }
     let (granted, formulas) = (folder.granted()?, arguments.formulas);
     let (granted, planned) = (granted.as_ref(), planned.as_slice());
-    let report = Report { options: &options, results: &results, planned, granted, formulas };
-    // Tables contain the notes. The other formats have no place for them.
+    let version = folder.version()?.unwrap_or_default();
+    let (version, options, results) = (version.as_str(), &options, results.as_slice());
+    let report = Report { version, options, results, planned, granted, formulas };
+    // Tables of scores contain the notes. The other outputs have no place for them.
     let is_table = matches!(format, Format::Table | Format::Markdown);
-    for note in report.notes().iter().filter(|_| !is_table || arguments.figure.is_some()) {
+    let is_other = arguments.figure.is_some() || arguments.losses || arguments.baseline.is_some();
+    for note in report.notes().iter().filter(|_| !is_table || is_other) {
         print_warning(note);
     }
     if arguments.losses {
@@ -62,7 +67,7 @@ pub fn run(arguments: &ReportArguments, format: OutputFormat) -> Result<ExitStat
         return Ok(ExitStatus::Success);
     }
     if let Some(path) = &arguments.baseline {
-        return report_differences(&report, path, format);
+        return report_differences(&folder, &report, path, format);
     }
     match &arguments.figure {
         Some(path) => write_figure(&report.scores(), report.labels(), path)?,
@@ -86,13 +91,22 @@ fn report_robustness(arguments: &ReportArguments, format: Format) -> Result<Exit
 }
 
 /// Prints the differences to the run in another folder.
-fn report_differences(report: &Report<'_>, path: &Path, format: Format) -> Result<ExitStatus> {
+fn report_differences(
+    run: &RunFolder,
+    report: &Report<'_>,
+    path: &Path,
+    format: Format,
+) -> Result<ExitStatus> {
     if !matches!(format, Format::Table | Format::Markdown) {
         let problem = "--baseline prints a table; choose --format text or md";
         return Err(EvalError::Options(problem.to_owned()).into());
     }
     let (folder, options) = RunFolder::read(path)?;
     let results = from_journal(&folder, &planned(&folder, &options).unwrap_or_default())?;
+    check_same_episodes(
+        ComparedRun { folder: run, options: report.options, results: report.results },
+        ComparedRun { folder: &folder, options: &options, results: &results },
+    )?;
     let name = path.display().to_string();
     let text = report.differences_text(&name, &results, format);
     print(&text.with_context(|| format!("{name} has no helper with episodes of this run"))?)?;
@@ -135,8 +149,11 @@ fn from_traces(folder: &RunFolder, planned: &[EpisodeJob]) -> Result<Vec<RunResu
             if let Some(note) = untraced_note(&recorded, &results) {
                 print_warning(&note);
             }
+            results.extend(untraced_failures(&recorded, &results));
         }
-        Err(e) => print_warning(&format!("can't check whether traces are missing: {e}")),
+        Err(e) => print_warning(&format!(
+            "can't check whether traces are missing or episode runs failed: {e}"
+        )),
     }
     Ok(results)
 }

@@ -32,7 +32,9 @@ pub fn run(arguments: &ShowArguments, format: OutputFormat) -> Result<ExitStatus
     let progress = Progress { planned: planned.len(), finished: results.len(), failed: n_failed };
     let n_traces = if options.traces { folder.traces()?.len() } else { 0 };
     let granted = folder.granted()?;
+    let version = folder.version()?.unwrap_or_default();
     let report = Report {
+        version: &version,
         options: &options,
         results: &results,
         planned: &planned,

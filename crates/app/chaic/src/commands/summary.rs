@@ -4,8 +4,8 @@ use std::path::Path;
 
 use anyhow::Result;
 use chaic_core::TaskId;
-use chaic_env::Track;
 use chaic_env::helper_registry::NONE;
+use chaic_env::{CHAIC_VERSION, Track};
 use chaic_eval::metrics::{FormulaSet, Score, Scores};
 use chaic_eval::report::{Format, Labels, Report, rounded, shown_interval};
 use chaic_eval::run::{Run, RunFolder};
@@ -28,7 +28,8 @@ const TASKS_PER_BLOCK: usize = (MAX_COLUMNS - HELPER_COLUMNS) / (TASK_COLUMNS + 
 pub fn report_of(run: &Run) -> Report<'_> {
     let (options, planned) = (run.options(), run.planned());
     let (results, granted, formulas) = (run.results(), Some(run.granted()), FormulaSet::Paper);
-    Report { options, results, planned, granted, formulas }
+    // A run of another version can't be opened.
+    Report { version: CHAIC_VERSION, options, results, planned, granted, formulas }
 }
 
 /// Returns the scores of a run as in its `scores.json`.

@@ -10,7 +10,7 @@ fn commands(dir: &Path) -> Vec<Vec<String>> {
         let mut arguments: Vec<&str> = parent.iter().map(String::as_str).collect();
         arguments.push("--help");
         let help = run_ok(dir, &arguments);
-        let headings = ["Play:", "Look:", "Learn:", "Check:", "Contest:", "Shell:", "Commands:"];
+        let headings = ["Play:", "Inspect:", "Learn:", "Check:", "Contest:", "Shell:", "Commands:"];
         let mut is_list = false;
         for line in help.lines() {
             if !line.starts_with(' ') {
@@ -61,7 +61,7 @@ fn the_help_has_groups_in_order() {
     let headings: Vec<&str> =
         help.lines().filter(|line| line.ends_with(':') && !line.starts_with(' ')).collect();
     let expected =
-        ["Play:", "Look:", "Learn:", "Check:", "Contest:", "Shell:", "Options:", "Examples:"];
+        ["Play:", "Inspect:", "Learn:", "Check:", "Contest:", "Shell:", "Options:", "Examples:"];
     assert_eq!(headings, expected, "{help}");
     assert!(help.contains("Exit codes"), "{help}");
     assert!(help.lines().all(|line| line.chars().count() <= 100), "{help}");

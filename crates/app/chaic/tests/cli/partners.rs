@@ -108,6 +108,24 @@ fn shards_with_several_partners_are_merged() {
     let report = |run: &str| read(&at.join(run).join("robustness.json"));
     assert_eq!(report("merged"), report("whole"));
     run_ok(at, &["verify", "merged"]);
+    // A merge that was stopped before its last files is repeated.
+    for removed in [&["drawn/report.html"][..], &["hasty/report.html", "drawn"]] {
+        for file in removed.iter().chain(&["robustness.md"]) {
+            let path = at.join("merged").join(file);
+            let is_removed =
+                if path.is_dir() { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
+            is_removed.expect("it exists");
+        }
+        run_ok(at, &["merge", "--out", "merged", "a", "b"]);
+        assert_eq!(report("merged"), report("whole"));
+        for file in ["drawn/report.html", "hasty/report.html", "robustness.md"] {
+            assert!(at.join("merged").join(file).is_file(), "{file}");
+        }
+    }
+    assert!(run_err(at, &["merge", "--out", "merged", "a", "b"]).contains("isn't empty"));
+    // Other parts are not merged into it.
+    fs::remove_file(at.join("merged/robustness.md")).expect("it exists");
+    assert!(run_err(at, &["merge", "--out", "merged", "a"]).contains("isn't empty"));
     let refused = run_err(at, &["merge", "--out", "c", "a", "whole/rules"]);
     assert!(refused.contains("has no runs with several partners"), "{refused}");
     let refused = run_err(at, &["eval", "--resume", "--out", "whole/rules", "--partners", "suite"]);

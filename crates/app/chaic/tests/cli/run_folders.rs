@@ -98,6 +98,61 @@ fn episode_runs_without_traces_are_played_again() {
 }
 
 #[test]
+fn failed_episode_runs_count_as_zero_in_reports_from_traces() {
+    let dir = played();
+    let at = dir.path();
+    let journal = at.join("run/results.jsonl");
+    let lines = fs::read_to_string(&journal).expect("a text file");
+    let line = |line: &str| {
+        let mut result: serde_json::Value = serde_json::from_str(line).expect("it is JSON");
+        if result["task"] == "no_constraint" {
+            let key = ["task", "helper", "episode", "seed"];
+            result.as_object_mut().expect("fields").retain(|name, _| key.contains(&name.as_str()));
+            result["status"] = "error".into();
+            result["message"] = "the episode broke down: out of ideas".into();
+        }
+        result.to_string() + "\n"
+    };
+    fs::write(&journal, lines.lines().map(line).collect::<String>()).expect("the disk has space");
+    fs::remove_file(at.join("run").join(TRACE)).expect("it exists");
+    let report = run_ok(at, &["report", "run", "--from-traces", "--format", "json"]);
+    assert_eq!(report, run_ok(at, &["report", "run", "--format", "json"]));
+    let report: serde_json::Value = serde_json::from_str(&report).expect("it is JSON");
+    let counts = serde_json::json!({"planned": 2, "scored": 2, "broken": 1, "missing": 0});
+    assert_eq!(report["episode_runs"], counts);
+}
+
+#[test]
+fn differences_are_of_the_same_episodes_and_name_missing_ones() {
+    let dir = played();
+    let at = dir.path();
+    let compare = ["report", "run", "--baseline", "again"];
+    run_ok(at, &[&PLAY[..], &["again"]].concat());
+    run_ok(at, &compare);
+    let journal = at.join("run/results.jsonl");
+    let lines = fs::read_to_string(&journal).expect("a text file");
+    let first = lines.lines().next().expect("a result").to_owned() + "\n";
+    fs::write(&journal, first).expect("the disk has space");
+    let out = output_of(at, &compare);
+    assert!(text(&out.stderr).contains("Unfinished: 1 of 2 episode runs"), "{out:?}");
+    fs::write(&journal, lines).expect("the disk has space");
+
+    // The same name for another episode.
+    for entry in fs::read_dir(at.join("short")).expect("it exists") {
+        let path = entry.expect("it exists").path();
+        let episode = fs::read_to_string(&path).expect("a text file");
+        let longer = episode.replacen("\"horizon\": 80", "\"horizon\": 90", 1);
+        assert_ne!(longer, episode);
+        fs::write(&path, longer).expect("the disk has space");
+    }
+    run_ok(at, &[&PLAY[..], &["other"]].concat());
+    let out = output_of(at, &["report", "run", "--baseline", "other"]);
+    assert_eq!(out.status.code(), Some(2));
+    let refused = text(&out.stderr);
+    assert!(refused.contains("run and other have different episodes with the name"), "{refused}");
+}
+
+#[test]
 fn altered_and_cut_traces_are_refused_or_reported() {
     let dir = played();
     let at = dir.path();

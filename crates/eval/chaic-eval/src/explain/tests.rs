@@ -1,7 +1,7 @@
 //! Promise: an explanation names each change of the belief and of the plans once, with its reason.
 
 use chaic_core::agent::Thought;
-use chaic_core::{Action, FailureReason, Hand, Outcome};
+use chaic_core::{Action, ClassId, FailureReason, Hand, Outcome};
 use chaic_env::trace::{Decision, End, TraceEvent};
 use chaic_env::{Digest, EpisodeConfig, trace_header};
 use chaic_episodes::{Episode, find_episode};
@@ -140,6 +140,7 @@ fn events_and_the_end_are_explained() {
         event(50, delivered(AgentId::PARTNER, true), Some("apple")),
         event(60, delivered(AgentId::HELPER, false), Some("apple")),
         event(60, delivered(AgentId::HELPER, true), Some("plastic_basket")),
+        event(65, delivered(AgentId::HELPER, true), Some("vase")),
         helper(70, thought([800, 200], [300, 700], &[], &["deliver"])),
     ];
     let explanation = explain(&trace("infer", records.clone()), episode.setup());
@@ -152,7 +153,7 @@ fn events_and_the_end_are_explained() {
         format!("frame    50  Partner delivers {label} {object}, which counts.\n"),
         format!("frame    60  Helper delivers {label} {object}, which does not count.\n"),
         "The trace is cut off after frame 70.\n".to_owned(),
-        "Deliveries: partner 1, counted 1; helper 1, counted 0.\n".to_owned(),
+        "Deliveries: partner 1, counted 1; helper 2, counted 1.\n".to_owned(),
     ] {
         assert!(text.contains(&expected), "{expected}: {text}");
     }

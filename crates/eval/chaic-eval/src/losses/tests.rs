@@ -4,8 +4,8 @@ use chaic_core::TaskId;
 use chaic_core::observation::Grants;
 
 use super::*;
+use crate::metrics::Environments;
 use crate::metrics::tests::{case, result};
-use crate::metrics::{Environments, RunResult};
 
 /// Counted objects of ten in each of two episodes.
 const DONE: [(&str, [f64; 2]); 6] = [
@@ -23,6 +23,10 @@ fn results() -> Vec<RunResult> {
 }
 
 fn losses(helpers: &[&str]) -> Result<Losses, String> {
+    losses_of(&results(), helpers)
+}
+
+fn losses_of(results: &[RunResult], helpers: &[&str]) -> Result<Losses, String> {
     let helpers: Vec<String> = helpers.iter().map(|h| (*h).to_owned()).collect();
     let grants = |helper: &String| match helper.as_str() {
         "oracle" => Grants::ORACLE,
@@ -38,8 +42,8 @@ fn losses(helpers: &[&str]) -> Result<Losses, String> {
         isolation: Default::default(),
         weights: Default::default(),
     };
-    let (results, environments) = (results(), Environments::default());
-    let played = PlayedEpisodes { results: &results, planned: &[], environments: &environments };
+    let environments = Environments::default();
+    let played = PlayedEpisodes { results, planned: &[], environments: &environments };
     Losses::new(played, &helpers, &granted)
 }
 
@@ -64,6 +68,19 @@ fn the_grants_of_a_helper_decide_its_references() {
     assert_eq!(means(&losses, "infer_known_goal"), [("total", 0.2), ("search", 0.2)]);
     let interval = losses.helpers[0].losses[0].tasks[&TaskId::LowTarget];
     assert!(interval.low < 0.55 && 0.55 < interval.high, "{interval:?}");
+}
+
+#[test]
+fn losses_are_over_the_episodes_that_all_references_have() {
+    let all = DONE.map(|(helper, _)| helper);
+    let mut results = results();
+    // A third episode lacks one of the references.
+    let played = all.into_iter().filter(|helper| *helper != "infer_known_goal");
+    results.extend(played.map(|helper| result(case(helper, "e2", 9.0, 10.0))));
+    let (unfinished, finished) = (losses_of(&results, &all).unwrap(), losses(&all).unwrap());
+    for helper in ["rhp", "infer", "oracle", "infer_known_goal"] {
+        assert_eq!(means(&unfinished, helper), means(&finished, helper), "{helper}");
+    }
 }
 
 #[test]

@@ -18,9 +18,9 @@ const RESAMPLES: usize = 10_000;
 /// Seed of the resampling; it is fixed so that reports are reproducible.
 const SEED: u64 = 0;
 
-/// Environment of each episode, by episode id.
+/// Environment of each episode, by task and episode id.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Environments(BTreeMap<String, String>);
+pub struct Environments(BTreeMap<TaskId, BTreeMap<String, String>>);
 
 /// A mean with its 95 % confidence interval over environments.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -55,14 +55,19 @@ struct Cluster {
 }
 
 impl Environments {
-    /// Creates the map from pairs of episode and environment.
-    pub fn new(pairs: impl IntoIterator<Item = (String, String)>) -> Environments {
-        Environments(pairs.into_iter().collect())
+    /// Creates the map from triples of task, episode and environment.
+    pub fn new(entries: impl IntoIterator<Item = (TaskId, String, String)>) -> Environments {
+        let mut environments = Environments::default();
+        for (task, episode, environment) in entries {
+            environments.0.entry(task).or_default().insert(episode, environment);
+        }
+        environments
     }
 
     /// Returns the environment of an episode; the episode id if the environment is unknown.
-    pub fn get<'a>(&'a self, episode: &'a str) -> &'a str {
-        self.0.get(episode).map_or(episode, String::as_str)
+    pub fn get<'a>(&'a self, task: TaskId, episode: &'a str) -> &'a str {
+        let known = self.0.get(&task).and_then(|of_task| of_task.get(episode));
+        known.map_or(episode, String::as_str)
     }
 }
 

@@ -28,7 +28,7 @@ pub struct Difference {
 pub struct Resolution {
     /// Number of environments in which the episodes take place.
     pub environments: usize,
-    /// Median over pairs of helpers.
+    /// Median over pairs of helpers; the mean of the two middle values of an even number of pairs.
     pub median: f64,
     /// Maximum over pairs of helpers.
     pub largest: f64,
@@ -92,7 +92,7 @@ pub fn mean_rate(
     for (task, by_helper) in &groups {
         let Some(episodes) = by_helper.get(helper) else { continue };
         for (episode, runs) in episodes {
-            all.add(*task, environments.get(episode), over_seeds(runs, Summary::rate));
+            all.add(*task, environments.get(*task, episode), over_seeds(runs, Summary::rate));
         }
     }
     Some((all.mean()?, all.interval()))
@@ -113,7 +113,7 @@ fn difference(
         let mut in_task = Clusters::default();
         for (episode, rate) in a {
             let Some(baseline_rate) = b.get(episode) else { continue };
-            let environment = environments.get(episode);
+            let environment = environments.get(*task, episode);
             n_episodes += 1;
             in_task.add(*task, environment, rate - baseline_rate);
             all.add(*task, environment, rate - baseline_rate);
@@ -146,7 +146,7 @@ pub fn resolution(differences: &[Difference], task: Option<TaskId>) -> Option<Re
     halves.sort_by(f64::total_cmp);
     Some(Resolution {
         environments: intervals.iter().map(|i| i.environments).max()?,
-        median: *halves.get((halves.len() - 1) / 2)?,
+        median: (*halves.get((halves.len() - 1) / 2)? + halves[halves.len() / 2]) / 2.0,
         largest: *halves.last()?,
     })
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use chaic_core::{AgentId, ClassId, EntityId, Frame, Role, TaskId};
+use chaic_core::{AgentId, ClassId, EntityId, Frame, TaskId};
 use chaic_env::{Digest, RunKey};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -169,7 +169,7 @@ impl Delivery {
 
     /// Returns whether the object can be a target. Containers and vehicles can't.
     pub fn is_target_class(&self) -> bool {
-        matches!(self.class.info().role, Role::Target | Role::Fragile | Role::HeavyTarget)
+        self.class.info().is_possible_target()
     }
 
     /// Returns the value of the object in this task.

@@ -222,7 +222,7 @@ impl Estimate {
     fn new(cells: &[(EpisodeKey<'_>, f64)], environments: &Environments) -> Option<Estimate> {
         let mut clusters = Clusters::default();
         for ((task, episode), value) in cells {
-            clusters.add(*task, environments.get(episode), *value);
+            clusters.add(*task, environments.get(*task, episode), *value);
         }
         Some(Estimate { mean: clusters.mean()?, interval: clusters.interval() })
     }

@@ -151,7 +151,7 @@ impl Group<'_> {
             for run in runs {
                 let rate = run.map_or(0.0, Summary::rate);
                 rates.push(rate);
-                by_environment.add(self.task, self.environments.get(episode), rate);
+                by_environment.add(self.task, self.environments.get(self.task, episode), rate);
             }
         }
         let interval = by_environment.interval();
@@ -244,7 +244,7 @@ impl Group<'_> {
             let Some(m0) = without.and_then(|runs| over_played(runs, amount)) else { continue };
             let m = over_seeds(with, amount);
             let improvement = (m - m0) / m.max(m0).max(formulas.ei_floor);
-            clusters.add(self.task, self.environments.get(episode), improvement);
+            clusters.add(self.task, self.environments.get(self.task, episode), improvement);
         }
         clusters
     }

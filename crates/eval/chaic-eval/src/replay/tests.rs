@@ -4,11 +4,12 @@ use chaic_core::agent::{PartnerBelief, Thought};
 use chaic_core::{Action, ClassId};
 use chaic_env::helper_registry::{BuiltInHelpers, HelperRegistry as _};
 use chaic_env::trace::{Decision, End, Record};
-use chaic_env::{Digest, EpisodeConfig, trace_header};
+use chaic_env::{Digest, EpisodeConfig, RunKey, trace_header};
 use chaic_episodes::find_episode;
 use image::Rgb;
 
 use super::*;
+use crate::run::FolderMode;
 
 /// Color of the bar of a true hypothesis, and of the helper on the map.
 const GREEN: [u8; 3] = [20, 150, 70];
@@ -74,6 +75,24 @@ fn a_belief_adds_bars_and_a_ring_on_the_map() {
         let image = render(id, Some(belief("a long description of an operation")));
         assert!(has_margin(&image), "{id}");
     }
+}
+
+#[test]
+fn the_lowest_seed_is_selected_by_its_number() {
+    let dir = tempfile::tempdir().unwrap();
+    let (folder, _) = RunFolder::lock(&dir.path().join("run"), FolderMode::New).unwrap();
+    let trace = |helper: &str, seed| {
+        let (task, helper) = (TaskId::LowTarget, helper.to_owned());
+        folder.trace(&RunKey { task, helper, episode: "low_target/test/00".to_owned(), seed })
+    };
+    for (helper, seed) in [("rhp", 1), ("infer", 10), ("infer", 2), ("infer", 31)] {
+        let path = trace(helper, seed);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, "").unwrap();
+    }
+    let find = |helper| find_trace(&folder, "low_target/test/00", helper, None).unwrap();
+    assert_eq!(find(None), trace("infer", 2));
+    assert_eq!(find(Some("rhp")), trace("rhp", 1));
 }
 
 #[test]

@@ -53,6 +53,14 @@ pub fn untraced_note(journaled: &[RunResult], scored: &[RunResult]) -> Option<St
     ))
 }
 
+/// Returns the failed episode runs of the journal that `scored`, the results from traces, lack. A
+/// failed episode run has no trace, but counts as zero.
+pub fn untraced_failures(journaled: &[RunResult], scored: &[RunResult]) -> Vec<RunResult> {
+    let scored: BTreeSet<&RunKey> = scored.iter().map(|r| &r.key).collect();
+    let is_failed = |r: &&RunResult| r.summary().is_none() && !scored.contains(&r.key);
+    journaled.iter().filter(is_failed).cloned().collect()
+}
+
 /// Pairs of episode and seed by helper.
 type ByHelper<'a> = BTreeMap<&'a str, BTreeSet<(&'a str, u32)>>;
 

@@ -3,7 +3,7 @@
 use chaic_core::TaskId;
 use chaic_core::observation::Grants;
 use chaic_env::rules::RuleSetName;
-use chaic_env::{Digest, RunKey};
+use chaic_env::{CHAIC_VERSION, Digest, RunKey};
 
 use super::*;
 use crate::figure::MAX_HELPERS;
@@ -78,8 +78,23 @@ fn text_with(results: &[RunResult], granted: Option<&RunGrants>, format: Format)
     let job =
         |r: RunResult| EpisodeJob { environment: r.key.episode.clone(), key: r.key, horizon: 1000 };
     let planned: Vec<EpisodeJob> = self::results().into_iter().map(job).collect();
-    let formulas = FormulaSet::Paper;
-    Report { options: &options(), results, planned: &planned, granted, formulas }.text(format)
+    let (version, formulas) = (CHAIC_VERSION, FormulaSet::Paper);
+    Report { version, options: &options(), results, planned: &planned, granted, formulas }
+        .text(format)
+}
+
+#[test]
+fn the_heading_has_the_version_that_started_the_run() {
+    let (results, options) = (results(), options());
+    let heading = |version: &str| {
+        let (results, formulas) = (&results, FormulaSet::Paper);
+        let report =
+            Report { version, options: &options, results, planned: &[], granted: None, formulas };
+        report.text(Format::Markdown).lines().nth(2).unwrap().to_owned()
+    };
+    assert!(heading(CHAIC_VERSION).starts_with(&format!("chaic {CHAIC_VERSION}, rules")));
+    let older = format!("chaic 0.0.7 (report of chaic {CHAIC_VERSION}), rules");
+    assert!(heading("0.0.7").starts_with(&older), "{}", heading("0.0.7"));
 }
 
 #[test]
@@ -143,6 +158,7 @@ fn a_report_of_many_helpers_is_written_without_figures() {
         let options = RunOptions { helpers, ..options() };
         let formulas = FormulaSet::Paper;
         let report = Report {
+            version: CHAIC_VERSION,
             options: &options,
             results: &results,
             planned: &planned,

@@ -29,6 +29,8 @@ const FIGURE_PNG: &str = "figure.png";
 /// Input of a report.
 #[derive(Clone, Copy, Debug)]
 pub struct Report<'a> {
+    /// Version of chaic that started the run.
+    pub version: &'a str,
     /// Options of the run.
     pub options: &'a RunOptions,
     /// Results of the run.
@@ -219,11 +221,15 @@ impl Report<'_> {
             [] => rules.to_string(),
             _ => format!("{rules} with {}", rule_overrides.join(", ")),
         };
+        let mut version = self.version.to_owned();
+        if version != CHAIC_VERSION {
+            let _ = write!(version, " (report of chaic {CHAIC_VERSION})");
+        }
         let driven = partner.as_ref();
         let driven = driven.map_or(String::new(), |p| format!(" The partner is driven by `{p}`."));
         let person = person.map_or(String::new(), |k| format!(" The partner is `{k}`."));
         format!(
-            "# chaic run\n\nchaic {CHAIC_VERSION}, rules `{played_by}`, formulas `{}`. Split `{split}`, \
+            "# chaic run\n\nchaic {version}, rules `{played_by}`, formulas `{}`. Split `{split}`, \
              {episodes} episodes of each task, seeds per episode: {seeds}. Images: {size}.{driven}{person}{track}\n\n",
             self.formulas,
         )

@@ -2,17 +2,20 @@
 
 use chaic_core::Role;
 use chaic_env::Digest;
-use chaic_episodes::Episode;
+use chaic_episodes::{Episode, environment_of_changed};
 use chaic_world::Setup;
 
 /// Returns the name of an episode's environment. A generated episode has it in its metadata. Other
-/// indoor episodes share an environment if walls and fixed furniture are equal. An outdoor episode
-/// is its own environment, because outdoor layouts have no distinctive parts.
+/// indoor episodes share an environment if walls and fixed furniture are equal. Another outdoor
+/// episode is its own environment, because outdoor layouts have no distinctive parts; if only its
+/// partner was changed, it has the environment of the generated episode.
 pub(crate) fn environment(episode: &Episode) -> String {
     let setup = episode.setup();
     match episode.generator() {
         Some(generator) => generator.environment(),
-        None if setup.walls.is_empty() => episode.id().to_owned(),
+        None if setup.walls.is_empty() => {
+            environment_of_changed(episode).unwrap_or_else(|| episode.id().to_owned())
+        }
         None => format!("house/{}", layout(setup)),
     }
 }
@@ -55,6 +58,23 @@ mod tests {
                 (split.parse().unwrap(), if split == "test" { 7 } else { 2 });
             assert_eq!(split.environment(TaskId::Obstacle, k), environment_of(id));
         }
+    }
+
+    #[test]
+    fn a_changed_partner_stays_in_the_environment() {
+        for task in ["low_target", "shopping", "moving_house"] {
+            let changed = |id: &str| environment_of(&format!("{task}/{id}/+tires"));
+            assert_eq!(changed("test/01"), changed("test/07"), "{task}");
+            assert_ne!(changed("test/01"), changed("test/02"), "{task}");
+            assert_ne!(changed("test/01"), changed("train/01"), "{task}");
+        }
+        for id in ["shopping/test/03", "moving_house/gen/5", "shopping/gen-standard/5"] {
+            assert_eq!(environment_of(&format!("{id}/+tires")), environment_of(id));
+        }
+        // Another episode with the name of a bundled one.
+        let setup = find_episode("shopping/test/01").unwrap().into_setup();
+        let other = Episode::new("shopping/test/02/+tires", "files", None, setup).unwrap();
+        assert_eq!(environment(&other), "shopping/test/02/+tires");
     }
 
     #[test]

@@ -280,7 +280,7 @@ impl RunFolder {
     ///
     /// # Errors
     /// If `run.json` can't be read.
-    pub(crate) fn version(&self) -> Result<Option<String>> {
+    pub fn version(&self) -> Result<Option<String>> {
         Ok(self.recorded()?.map(|file| file.chaic))
     }
 

@@ -2,7 +2,7 @@
 //! finished.
 
 use std::collections::BTreeMap;
-use std::io::{BufRead as _, BufReader, ErrorKind, Read as _, Write as _};
+use std::io::{self, BufRead as _, BufReader, ErrorKind, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use chaic_core::Frame;
@@ -24,6 +24,10 @@ const MAX_LINE_BYTES: u64 = 8 << 20;
 pub struct Journal {
     file: OutputFile,
     path: PathBuf,
+    /// Total length of the complete lines, bytes.
+    complete_len: u64,
+    /// True if a failed write may have left a part of a line after the complete ones.
+    has_fragment: bool,
     /// True if a later line replaces the finished result of an episode run.
     has_duplicates: bool,
 }
@@ -54,18 +58,43 @@ impl Journal {
             read_journal(path, planned)?;
         let file = open_for_append(path)?;
         file.set_len(complete_len).map_err(EvalError::io("open", path))?;
-        let has_duplicates = !repeated.is_empty();
-        Ok((Journal { file, path: path.to_owned(), has_duplicates }, results, warnings))
+        let (path, has_duplicates) = (path.to_owned(), !repeated.is_empty());
+        let journal = Journal { file, path, complete_len, has_fragment: false, has_duplicates };
+        Ok((journal, results, warnings))
     }
 
     /// Appends a result and syncs it to disk.
     ///
     /// # Errors
-    /// If the file can't be written.
+    /// If the file can't be written. The result is then not in the journal, and others can be
+    /// appended.
     pub fn append(&mut self, result: &RunResult) -> Result<()> {
+        self.remove_fragment().map_err(EvalError::io("write", &self.path))?;
         let line = to_line(result) + "\n";
         let written = self.file.write_all(line.as_bytes()).and_then(|()| self.file.sync_data());
+        self.finish_append(line.len() as u64, written)
+    }
+
+    /// Counts a written line, or removes what a failed write has left of it.
+    fn finish_append(&mut self, line_len: u64, written: io::Result<()>) -> Result<()> {
+        match written {
+            Ok(()) => self.complete_len += line_len,
+            Err(_) => {
+                self.has_fragment = true;
+                // If this fails as well, the next append tries it again.
+                let _ = self.remove_fragment();
+            }
+        }
         written.map_err(EvalError::io("write", &self.path))
+    }
+
+    /// Truncates the file to its complete lines if a write has failed.
+    fn remove_fragment(&mut self) -> io::Result<()> {
+        if self.has_fragment {
+            self.file.set_len(self.complete_len)?;
+            self.has_fragment = false;
+        }
+        Ok(())
     }
 
     /// Records that a result appended next replaces a finished one.
@@ -84,7 +113,8 @@ impl Journal {
         let lines: String = results.iter().map(|result| to_line(result) + "\n").collect();
         write_atomically(&self.path, lines.as_bytes())?;
         self.file = open_for_append(&self.path)?;
-        self.has_duplicates = false;
+        self.complete_len = lines.len() as u64;
+        (self.has_fragment, self.has_duplicates) = (false, false);
         Ok(())
     }
 }
@@ -194,5 +224,35 @@ fn check(
             Err(format!("`frames` is {n}, expected at most {horizon}, the episode's horizon"))
         }
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+    use crate::metrics::tests::{case, result};
+
+    #[test]
+    fn a_failed_append_leaves_no_fragment_before_the_next_line() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("results.jsonl");
+        let results = ["e0", "e1", "e2"].map(|episode| result(case("rhp", episode, 1.0, 10.0)));
+        let (mut journal, _, _) = Journal::open(&path, &[]).unwrap();
+        journal.append(&results[0]).unwrap();
+        let complete = fs::read(&path).unwrap();
+        // The disk is full in the middle of a line.
+        journal.file.write_all(b"{\"task\":\"low_t").unwrap();
+        let full = io::Error::from(ErrorKind::StorageFull);
+        assert!(journal.finish_append(200, Err(full)).is_err());
+        assert_eq!(fs::read(&path).unwrap(), complete);
+        // The fragment could not be removed at once.
+        journal.file.write_all(b"{\"task\":").unwrap();
+        journal.has_fragment = true;
+        for result in &results[1..] {
+            journal.append(result).unwrap();
+        }
+        assert_eq!(read_results(&path, &[]).unwrap(), (results.to_vec(), vec![]));
     }
 }

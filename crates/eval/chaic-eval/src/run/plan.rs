@@ -93,8 +93,9 @@ pub(super) fn check_recorded(
     files: Option<&[Episode]>,
     playable: &BTreeMap<String, Digest>,
 ) -> Result<()> {
-    let planned: BTreeSet<&str> = jobs.iter().map(|job| job.key.episode.as_str()).collect();
-    for id in planned {
+    let planned: BTreeSet<(TaskId, &str)> =
+        jobs.iter().map(|job| (job.key.task, job.key.episode.as_str())).collect();
+    for (task, id) in planned {
         let recorded = playable.get(id).ok_or_else(|| {
             let n = playable.len();
             let first = playable.keys().next().map_or("", String::as_str);
@@ -105,7 +106,10 @@ pub(super) fn check_recorded(
             ))
         })?;
         let setup = match files {
-            Some(files) => files.iter().find(|e| e.id() == id).map(|e| Digest::of_setup(e.setup())),
+            Some(files) => {
+                let file = files.iter().find(|e| e.task() == task && e.id() == id);
+                file.map(|e| Digest::of_setup(e.setup()))
+            }
             None => Some(Digest::of_setup(find_episode(id)?.setup())),
         };
         if setup.is_some_and(|setup| setup != *recorded) {
@@ -119,7 +123,8 @@ pub(super) fn check_recorded(
 
 /// Returns the environments of planned episodes.
 pub fn environments(jobs: &[EpisodeJob]) -> Environments {
-    Environments::new(jobs.iter().map(|job| (job.key.episode.clone(), job.environment.clone())))
+    let entry = |job: &EpisodeJob| (job.key.task, job.key.episode.clone(), job.environment.clone());
+    Environments::new(jobs.iter().map(entry))
 }
 
 /// Plan of one episode.
@@ -202,6 +207,20 @@ pub(super) fn check_episode_files(
 /// Compares the episode files of a folder with those of the run byte by byte, which is faster than
 /// parsing them.
 fn same_files(source: &Path, folder: &RunFolder) -> Result<bool> {
+    same_bytes(source, &read_episode_file, folder)
+}
+
+/// Compares names and bytes of two runs' copies of episodes.
+pub(super) fn same_copies(a: &RunFolder, b: &RunFolder) -> Result<bool> {
+    same_bytes(&a.episode_files(), &|path| a.copy_bytes(path), b)
+}
+
+/// Compares names and bytes of the episode files of a folder with those of the run.
+fn same_bytes(
+    source: &Path,
+    read: &dyn Fn(&Path) -> Result<Vec<u8>>,
+    folder: &RunFolder,
+) -> Result<bool> {
     let (a, b) = (episode_files(source)?, episode_files(&folder.episode_files())?);
     let names = |files: &[PathBuf]| -> Vec<_> {
         files.iter().filter_map(|p| p.file_name().map(ToOwned::to_owned)).collect()
@@ -210,7 +229,7 @@ fn same_files(source: &Path, folder: &RunFolder) -> Result<bool> {
         return Ok(false);
     }
     for (a, b) in a.iter().zip(&b) {
-        if read_episode_file(a)? != folder.copy_bytes(b)? {
+        if read(a)? != folder.copy_bytes(b)? {
             return Ok(false);
         }
     }
@@ -254,4 +273,43 @@ pub(super) fn copy_episodes(episodes: &[Episode], folder: &RunFolder) -> Result<
         write_atomically(&copy, episode.to_json().as_bytes())?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns an episode of each of two tasks; both have the same id.
+    fn episodes_with_one_id() -> [Episode; 2] {
+        ["low_target/test/00", "high_target/test/01"].map(|id| {
+            let setup = find_episode(id).unwrap().into_setup();
+            Episode::new("same", "files", None, setup).unwrap()
+        })
+    }
+
+    fn jobs(episodes: &[Episode]) -> Vec<EpisodeJob> {
+        let job = |episode: &Episode| {
+            let (task, helper, episode_id) =
+                (episode.task(), "rhp".to_owned(), episode.id().to_owned());
+            let key = RunKey { task, helper, episode: episode_id, seed: 0 };
+            EpisodeJob { key, horizon: 100, environment: environment(episode) }
+        };
+        episodes.iter().map(job).collect()
+    }
+
+    #[test]
+    fn episodes_of_two_tasks_may_have_the_same_id() {
+        let files = episodes_with_one_id();
+        let jobs = jobs(&files);
+        let environments = environments(&jobs);
+        for job in &jobs {
+            assert_eq!(environments.get(job.key.task, "same"), job.environment);
+        }
+        assert_ne!(jobs[0].environment, jobs[1].environment);
+        // The recording is of the first task only.
+        let playable = BTreeMap::from([("same".to_owned(), Digest::of_setup(files[0].setup()))]);
+        check_recorded(&jobs[..1], Some(&files), &playable).unwrap();
+        let error = check_recorded(&jobs, Some(&files), &playable).unwrap_err().to_string();
+        assert!(error.contains("is of another version of the episode"), "{error}");
+    }
 }

@@ -6,22 +6,24 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use chaic_env::RunKey;
 use chaic_env::trace::MAX_TRACE_BYTES;
+use chaic_env::{CHAIC_VERSION, RunKey};
 use chaic_files::{
     EntryKind, FileError, create_folders_below, entries, kind, read_below, write_atomically,
 };
 
 use super::folder::{COMMANDS, EPISODES, RECORDS};
 use super::journal::{Journal, read_results, to_line};
+use super::options::FILES;
 use super::plan;
-use super::{FolderMode, Run, RunFolder};
+use super::{EpisodeJob, FolderMode, Run, RunFolder};
 use crate::error::{EvalError, Result};
 use crate::metrics::{FormulaSet, RunResult};
 use crate::report::{Report, write_files};
 
-/// Every `count`-th episode run of a plan, from one of them on. The folder of a shard does not
-/// record the shard; it holds an unfinished run that can be resumed as a whole.
+/// Every `count`-th episode of a plan, from one of them on, with all helpers; each seed counts as an
+/// episode. The folder of a shard does not record the shard; it holds an unfinished run that can be
+/// resumed as a whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
     number: u32,
@@ -37,9 +39,12 @@ impl Shard {
         (1..=count).contains(&number).then_some(Shard { number, count })
     }
 
-    /// Returns whether the shard contains the episode run with this index in the plan.
-    pub fn contains(self, index: usize) -> bool {
-        index % self.count as usize == (self.number - 1) as usize
+    /// Returns whether the shard contains the episode run with this index in the plan of a run with
+    /// `n_helpers` helpers.
+    pub fn contains(self, index: usize, n_helpers: usize) -> bool {
+        // A plan lists the helpers of an episode one after the other.
+        let episode = index / n_helpers.max(1);
+        episode % self.count as usize == (self.number - 1) as usize
     }
 }
 
@@ -68,9 +73,9 @@ impl FromStr for Shard {
 /// same merge can be repeated.
 ///
 /// # Errors
-/// If the parts are of different runs, have different results of an episode run, or have helpers
-/// that query language models; if a finished episode run has no trace; if files can't be read or
-/// written.
+/// If the parts are of different runs or other episode files, have different results of an episode
+/// run, or have helpers that query language models; if a finished episode run has no trace; if files
+/// can't be read or written.
 pub fn merge(out: &Path, parts: &[PathBuf]) -> Result<Run> {
     let Some(first) = parts.first() else {
         return Err(EvalError::Options("name the runs to merge".to_owned()));
@@ -90,6 +95,13 @@ pub fn merge(out: &Path, parts: &[PathBuf]) -> Result<Run> {
                 part.display(),
             )));
         }
+        if options.split == FILES && !plan::same_copies(&source, &folder)? {
+            return Err(EvalError::Options(format!(
+                "{} and {} have other episode files; play all shards with the same --episodes",
+                first.display(),
+                part.display(),
+            )));
+        }
         if kind(&folder.join(RECORDS))? != EntryKind::Missing {
             return Err(EvalError::Options(format!(
                 "{} has helpers that query language models, whose records can't be merged; play such a \
@@ -102,8 +114,7 @@ pub fn merge(out: &Path, parts: &[PathBuf]) -> Result<Run> {
         EvalError::Options(format!("{} was started by an older version of chaic", first.display()))
     })?;
     let planned = plan::planned(&source, &options)?;
-    let order: Vec<&RunKey> = planned.iter().map(|job| &job.key).collect();
-    let from_parts = results(parts, &order)?;
+    let from_parts = results(parts, &planned)?;
     let is_traced = |result: &RunResult| options.traces && result.summary().is_some();
     for (result, part) in from_parts.iter().filter(|(result, _)| is_traced(result)) {
         check_trace(&RunFolder::read(part)?.0, &result.key)?;
@@ -124,12 +135,41 @@ pub fn merge(out: &Path, parts: &[PathBuf]) -> Result<Run> {
     folder.write("results.jsonl", lines.as_bytes())?;
     if !results.is_empty() {
         let (granted, formulas) = (Some(&granted), FormulaSet::Paper);
-        let (options, results, planned) = (&options, &results, &planned);
-        write_files(&folder, &Report { options, results, planned, granted, formulas })?;
+        let (version, options) = (CHAIC_VERSION, &options);
+        let (results, planned) = (&results, &planned);
+        let report = Report { version, options, results, planned, granted, formulas };
+        write_files(&folder, &report)?;
     }
     folder.write_options(&options, &granted)?;
     folder.end_merge()?;
     let (journal, results, _) = Journal::open(&folder.results(), &planned)?;
+    Ok(Run { folder, options, granted, journal, planned, results, untraced: Vec::new() })
+}
+
+/// Opens the run of an earlier [`merge`] of the same parts.
+///
+/// # Errors
+/// [`EvalError::NotEmpty`] if the folder has another run, or other results than the parts; if files
+/// can't be read.
+pub(crate) fn reopen_merged(out: &Path, parts: &[PathBuf]) -> Result<Run> {
+    let other_run = || EvalError::NotEmpty { path: out.to_owned() };
+    let (folder, recorded) = RunFolder::lock(out, FolderMode::Resume)?;
+    let (options, granted) = recorded.zip(folder.granted()?).ok_or_else(other_run)?;
+    for part in parts {
+        let (part, part_options) = RunFolder::read(part)?;
+        let is_same = part_options == options && part.granted()?.as_ref() == Some(&granted);
+        if !is_same || (options.split == FILES && !plan::same_copies(&part, &folder)?) {
+            return Err(other_run());
+        }
+    }
+    let planned = plan::planned(&folder, &options)?;
+    let mut from_parts = results(parts, &planned)?;
+    // A journal is read in the order of the keys.
+    from_parts.sort_by(|(a, _), (b, _)| a.key.cmp(&b.key));
+    let (journal, results, _) = Journal::open(&folder.results(), &planned)?;
+    if !from_parts.iter().map(|(result, _)| result).eq(&results) {
+        return Err(other_run());
+    }
     Ok(Run { folder, options, granted, journal, planned, results, untraced: Vec::new() })
 }
 
@@ -143,11 +183,11 @@ fn check_trace(part: &RunFolder, key: &RunKey) -> Result<()> {
 
 /// Returns the results of all parts in the order of the plan, each with its part. A completed
 /// result replaces a failed one.
-fn results<'p>(parts: &'p [PathBuf], order: &[&RunKey]) -> Result<Vec<(RunResult, &'p Path)>> {
+fn results<'p>(parts: &'p [PathBuf], planned: &[EpisodeJob]) -> Result<Vec<(RunResult, &'p Path)>> {
     let mut found: BTreeMap<RunKey, (RunResult, &Path)> = BTreeMap::new();
     for part in parts {
         let (folder, _) = RunFolder::read(part)?;
-        for result in read_results(&folder.results(), &[])?.0 {
+        for result in read_results(&folder.results(), planned)?.0 {
             match found.get(&result.key) {
                 Some((other, _)) if other.summary().is_some() && result.summary().is_none() => {}
                 Some((other, other_part)) if other.summary().is_some() && *other != result => {
@@ -166,7 +206,7 @@ fn results<'p>(parts: &'p [PathBuf], order: &[&RunKey]) -> Result<Vec<(RunResult
             }
         }
     }
-    Ok(order.iter().filter_map(|key| found.remove(key)).collect())
+    Ok(planned.iter().filter_map(|job| found.remove(&job.key)).collect())
 }
 
 /// Copies the episode files of a run.

@@ -197,8 +197,15 @@ fn shards_are_parsed_and_disjoint() {
     for wrong in ["0/4", "5/4", "2", "2/0", "-1/3", "a/b"] {
         assert!(wrong.parse::<Shard>().is_err(), "{wrong}");
     }
-    let shards: Vec<Shard> = (1..=3).map(|k| Shard::new(k, 3).unwrap()).collect();
-    assert!((0..20).all(|k| shards.iter().filter(|shard| shard.contains(k)).count() == 1));
+    let shards: Vec<Shard> = (1..=4).map(|k| Shard::new(k, 4).unwrap()).collect();
+    for n_helpers in 1..=4 {
+        let shards_with =
+            |k: usize| shards.iter().filter(move |shard| shard.contains(k, n_helpers));
+        assert!((0..40).all(|k| shards_with(k).count() == 1));
+        // A shard has all helpers of an episode.
+        let first = |k: usize| shards_with(k).next().unwrap();
+        assert!((0..40).all(|k| first(k) == first(k - k % n_helpers)));
+    }
 }
 
 #[test]

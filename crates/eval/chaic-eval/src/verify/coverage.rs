@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::fmt;
 
-use chaic_env::RunKey;
+use chaic_env::{CHAIC_VERSION, RunKey};
 
 use crate::error::Result;
 use crate::metrics::{FormulaSet, RunResult, RunStatus};
@@ -85,7 +85,8 @@ impl ReportState {
             return Ok(ReportState::OtherVersion(other));
         }
         let (granted, formulas) = (folder.granted()?, FormulaSet::Paper);
-        let report = Report { options, results, planned, granted: granted.as_ref(), formulas };
+        let (version, granted) = (CHAIC_VERSION, granted.as_ref());
+        let report = Report { version, options, results, planned, granted, formulas };
         let (missing, altered) = differing_files(folder, &report)?;
         Ok(ReportState::Compared { missing, altered })
     }

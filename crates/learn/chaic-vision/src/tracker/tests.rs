@@ -291,3 +291,29 @@ fn an_object_held_for_a_smaller_one_is_not_static_and_hides_no_detection() {
     assert_eq!([masked(0.7), masked(1.5)], [true, false]);
     assert_eq!(observer.observe(&[measurement("apple", 0.9, point.into())]).len(), 1);
 }
+
+#[test]
+fn a_missed_object_has_a_pixel_at_its_place_if_the_depth_is_that_of_the_object() {
+    let mut observer = Observer::new(&[]);
+    let at = [0.5, 0.8, -3.0];
+    let apple = observer.observe(&[measurement("apple", 0.9, at)])[0].track;
+    let camera = camera(observer.pose);
+    let (px, depth) = camera.project(Vec3::from(at)).expect("it is ahead");
+    let missed = |observer: &Observer, depth_m: f32| {
+        let depth_m = vec![depth_m; (SIDE_PX * SIDE_PX) as usize];
+        observer.tracker.missed(observer.now, &depth_m, &camera)
+    };
+    assert!(missed(&observer, depth).is_empty(), "it is detected");
+    observer.observe(&[]);
+    assert_eq!(missed(&observer, depth), [(apple, [px.x as u32, px.y as u32])]);
+    for other in [depth - 0.5, depth + 0.5] {
+        assert!(missed(&observer, other).is_empty(), "occluded, or gone");
+    }
+    let turned = Pose { yaw_rad: std::f32::consts::PI, ..observer.pose };
+    let depth_m = vec![depth; (SIDE_PX * SIDE_PX) as usize];
+    let behind = observer.tracker.missed(observer.now, &depth_m, &self::camera(turned));
+    assert!(behind.is_empty(), "behind");
+    observer.hold(Some((apple, "apple")));
+    observer.observe(&[]);
+    assert!(missed(&observer, depth).is_empty(), "held");
+}

@@ -120,6 +120,10 @@ impl World {
         hand: Option<Hand>,
         place: EntityId,
     ) -> StepProgress {
+        // Someone may have taken the place during the approach.
+        if !self.object(place).1.is_resting() {
+            return StepProgress::Failed(FailureReason::Impossible);
+        }
         if self.rules.reach_to == ReachTo::NearestPoint
             && let Err(reason) = self.check_within_reach(agent, place)
         {
@@ -295,7 +299,16 @@ impl World {
         let is_aside = set_down && on.is_none();
         // An agent may have moved to the spot meanwhile.
         let is_taken = is_aside && !self.is_free_floor(object, at);
-        let at = if is_taken { self.set_down_spot(agent, object) } else { at };
+        let at = match on.filter(|_| set_down) {
+            _ if is_taken => self.set_down_spot(agent, object),
+            // Another agent may have put something there meanwhile.
+            Some(place)
+                if !self.is_free_for(object, at, self.object(object).0.half_longer_side_m()) =>
+            {
+                self.free_spot_on(place, object, self.person(agent).pose.position, &[])
+            }
+            _ => at,
+        };
         let state = self.object_mut(object);
         state.released_at = goal_place;
         state.last_holder = Some(agent);

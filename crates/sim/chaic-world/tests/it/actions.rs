@@ -534,3 +534,55 @@ fn a_rider_docks_fills_the_basket_and_empties_it_at_the_goal() {
     }
     assert_eq!(w.progress(), (3.0, 3.0));
 }
+
+#[test]
+fn the_bicycle_of_a_rider_blocks_nothing_where_it_stood() {
+    for (persona, is_walked) in [(Persona::Rider, true), (Persona::Adult, false)] {
+        let mut bike = thing("bike", at(0.0, 0.0, 0.0));
+        bike.fixed = true;
+        let people = vec![person(persona, 2.0, 0.0), person(Persona::Helper, 0.0, 1.6)];
+        let mut w = world(hall(vec![bike], people));
+        for _ in 0..9 {
+            run(&mut w, B, Action::MoveForward);
+        }
+        let z = w.state().agents[1].pose.position.z;
+        assert_eq!(z < -1.0, is_walked, "{persona:?}: the helper stands at {z}");
+    }
+}
+
+#[test]
+fn a_put_on_ends_if_the_place_is_taken_meanwhile() {
+    let things =
+        vec![thing("apple", at(0.5, 0.0, 2.4)), thing("wicker_basket", at(0.0, 0.0, -0.2))];
+    let people = vec![person(Persona::Adult, 0.0, 2.2), person(Persona::Helper, 0.0, -0.9)];
+    let mut setup = hall(things, people);
+    setup.people[1].pose.yaw_rad = std::f32::consts::PI;
+    let mut w = world(setup);
+    assert_eq!(run(&mut w, A, pick(nth(0))).0, Outcome::Success);
+    w.submit(B, pick(nth(1))).unwrap();
+    let put = Action::PutOn { place: nth(1), hand: Hand::Right };
+    assert_eq!(run(&mut w, A, put).0, fails(FailureReason::Impossible));
+    assert_eq!(w.state().objects[1].holder(), Some(A), "the apple stays in the hand");
+}
+
+#[test]
+fn an_object_falls_on_if_its_support_is_taken_during_the_fall() {
+    let tray = thing("tea_tray", at(0.0, 0.0, -0.6));
+    let apple = thing("apple", at(0.0, 0.5, -0.6));
+    let mut w = world(hall(vec![tray, apple], vec![person(Persona::Adult, 0.0, 0.0)]));
+    w.submit(A, pick(nth(0))).unwrap();
+    while w.state().objects[1].holder().is_none() {
+        w.tick();
+    }
+    // The apple was on its way to the tray.
+    let mut state = w.state().clone();
+    let end = (at(0.0, 0.1, -0.6), state.objects[2].rotation);
+    state.objects[2].location =
+        ObjectLocation::Falling { path: vec![end].into(), on: Some(nth(0)) };
+    restore(&mut w, &state);
+    for _ in 0..200 {
+        w.tick();
+    }
+    let apple = &w.state().objects[2];
+    assert!(apple.is_resting() && apple.position.y < 0.02, "it lies at {}", apple.position);
+}

@@ -173,3 +173,26 @@ fn an_object_falls_on_the_object_below_the_taken_one() {
     assert_eq!(apple.location, ObjectLocation::Resting { on: Some(nth(0)) });
     assert!(apple.position.y < height + 0.02, "it lies at {}", apple.position);
 }
+
+#[test]
+fn a_removed_obstacle_covers_no_small_object() {
+    // Apples everywhere except where the bin stood.
+    let bin = Vec2::new(0.0, -0.7);
+    let mut things = vec![thing("trashbin", at(bin.x, 0.0, bin.y))];
+    for (i, j) in (-10..=10).flat_map(|i| (-10..=10).map(move |j| (i, j))) {
+        let p = 0.2 * Vec2::new(i as f32, j as f32);
+        if p.length() > 0.4 && p.distance(bin) > 0.5 {
+            things.push(thing("apple", at(p.x, 0.0, p.y)));
+        }
+    }
+    let n_apples = things.len() - 1;
+    let people = vec![person(Persona::Wheelchair, 9.0, 9.0), person(Persona::Helper, 0.0, 0.0)];
+    let mut w = world(hall(things, people));
+    let remove = Action::RemoveObstacle { obstacle: nth(0), hand: Hand::Right };
+    assert_eq!(run(&mut w, B, remove).0, Outcome::Success);
+    let radius = 0.5 * size(&w, nth(0)).x.max(size(&w, nth(0)).z);
+    for k in 1..=n_apples {
+        let apart_m = in_plan(position(&w, nth(0)), position(&w, nth(k)));
+        assert!(apart_m > radius, "apple {k} at {}", position(&w, nth(k)));
+    }
+}

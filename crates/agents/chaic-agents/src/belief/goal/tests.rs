@@ -125,6 +125,20 @@ fn one_object_of_another_set_is_the_extra_class_and_two_are_not() {
 }
 
 #[test]
+fn classes_are_wanted_given_a_set_if_they_belong_to_it_or_explain_a_take() {
+    let set = |class: &str| chaic_core::ClassId::named(class).info().sets[0];
+    let belief = belief_of(&takes(60, &[("apple", 1.0), ("orange", 1.0), ("bread", 1.0)]));
+    let given = |set_of: &str, class_name: &str| {
+        belief.probability_wanted_given(set(set_of), class(class_name))
+    };
+    assert!((given("apple", "banana") - 1.0).abs() < 1e-5, "it belongs to the set");
+    let bread = given("apple", "bread");
+    assert!(bread > 0.9, "the extra class of fruit: {bread}");
+    assert!(given("apple", "pen") < 0.1);
+    assert!((given("bread", "bread") - 1.0).abs() < 1e-5);
+}
+
+#[test]
 fn objects_beyond_the_wanted_number_are_explained_by_false_readings_only() {
     let briefing = house();
     let constraint = ConstraintBelief::new(&briefing);

@@ -202,6 +202,35 @@ fn takes_of_fruit_make_it_fetch_fruit() {
 }
 
 #[test]
+fn late_in_the_episode_it_acts_without_a_clear_goal() {
+    let all = [bed(), apple(), seen_partner(1.0, -2.0)];
+    let mut episode = Episode::ready(InferOptions::ALL, house);
+    let horizon = episode.briefing.horizon;
+    // An object vanished, which may have been overlooked.
+    let class = ClassId::named("apple");
+    let take = Take { class, strength: 0.3, frame: 0, top_m: None };
+    let belief = episode.policy.belief.as_mut().expect("the episode has begun");
+    belief.evidence.taken.insert(TrackId(60), take);
+    for fraction in [0.0, 0.2] {
+        episode.step((fraction * horizon as f32) as Frame, &all);
+        assert_eq!(episode.mode(), "watch", "{fraction}");
+    }
+    assert_eq!(episode.step(horizon / 2, &all), Plan::PickUp(subject(APPLE, "apple")));
+}
+
+#[test]
+fn objects_of_improbable_sets_are_not_fetched() {
+    let bread = seen(TrackId(44), "bread", [1.0, 0.0, 0.5], 0.1, 0.1);
+    let mut episode = Episode::ready(InferOptions::ALL, house);
+    episode.take(60, "apple");
+    // Fruit has about 0.85, each other set 0.05.
+    let plan = episode.step(10, &[bed(), bread.clone(), seen_partner(1.0, -2.0)]);
+    assert_eq!((plan, episode.mode()), (Plan::Explore, "plan".to_owned()));
+    let all = [bed(), bread, apple(), seen_partner(1.0, -2.0)];
+    assert_eq!(episode.step(20, &all), Plan::PickUp(subject(APPLE, "apple")));
+}
+
+#[test]
 fn a_pick_is_switched_only_for_a_gain() {
     let mut episode = Episode::ready(InferOptions::ALL, |briefing| {
         briefing.goal = Toy::goal(&[("apple", 1), ("banana", 1)]);

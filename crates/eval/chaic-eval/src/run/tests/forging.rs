@@ -25,8 +25,8 @@ fn write_report(path: &Path) {
     let Ok((results, _)) = read_results(&folder.results(), &planned) else { return };
     let granted = folder.granted().unwrap();
     let (results, planned, formulas) = (&results, &planned, crate::metrics::FormulaSet::Paper);
-    let report =
-        Report { options: &options, results, planned, granted: granted.as_ref(), formulas };
+    let (version, granted) = (chaic_env::CHAIC_VERSION, granted.as_ref());
+    let report = Report { version, options: &options, results, planned, granted, formulas };
     write_files(&folder, &report).unwrap();
 }
 

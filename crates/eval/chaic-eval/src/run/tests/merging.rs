@@ -190,6 +190,36 @@ fn a_merge_copies_regular_files_only_and_no_result_without_its_trace() {
 }
 
 #[test]
+fn parts_with_other_episodes_or_results_are_refused() {
+    let helpers = TestHelpers::new();
+    let (dir, parts) = shards(&helpers);
+    let out = dir.path().join("out");
+    let refused = || {
+        let error = merge(&out, &parts).unwrap_err().to_string();
+        assert!(!out.exists(), "{error}");
+        error
+    };
+    // Another version of an episode.
+    let copy = chaic_files::entries(&parts[1].join("episodes")).unwrap().remove(0);
+    let text = fs::read_to_string(&copy).unwrap();
+    fs::write(&copy, text.replacen("\"split\": \"short\"", "\"split\": \"other\"", 1)).unwrap();
+    assert_ne!(fs::read_to_string(&copy).unwrap(), text);
+    assert!(refused().contains("have other episode files"));
+    // An episode less.
+    fs::remove_file(&copy).unwrap();
+    assert!(refused().contains("have other episode files"));
+    fs::write(&copy, text).unwrap();
+    // A result of an unplanned episode run.
+    let journal = parts[1].join("results.jsonl");
+    let lines = fs::read_to_string(&journal).unwrap();
+    let unplanned = lines.lines().next().unwrap().replacen("obstacle/short/", "obstacle/long/", 1);
+    fs::write(&journal, format!("{lines}{unplanned}\n")).unwrap();
+    assert!(refused().contains("which this run doesn't play"));
+    fs::write(&journal, lines).unwrap();
+    drop(merge(&out, &parts).unwrap());
+}
+
+#[test]
 fn results_without_traces_are_played_again() {
     let files = episode_files(&[TaskId::LowTarget, TaskId::Shopping], 1);
     let dir = tempfile::tempdir().unwrap();

@@ -188,6 +188,7 @@ fn verification_counts_results_and_compares_the_report() {
     assert!(n_altered > 0);
     fs::write(&journal, &lines).unwrap();
     let run_report = crate::report::Report {
+        version: chaic_env::CHAIC_VERSION,
         options: run.options(),
         results: run.results(),
         planned: run.planned(),

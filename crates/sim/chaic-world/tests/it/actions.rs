@@ -577,8 +577,7 @@ fn an_object_falls_on_if_its_support_is_taken_during_the_fall() {
     // The apple was on its way to the tray.
     let mut state = w.state().clone();
     let end = (at(0.0, 0.1, -0.6), state.objects[2].rotation);
-    state.objects[2].location =
-        ObjectLocation::Falling { path: vec![end].into(), on: Some(nth(0)) };
+    state.objects[2].location = ObjectLocation::Falling { path: vec![end], on: Some(nth(0)) };
     restore(&mut w, &state);
     for _ in 0..200 {
         w.tick();

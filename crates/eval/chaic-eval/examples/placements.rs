@@ -1,5 +1,5 @@
-//! What the heights of objects reveal about the goal: `cargo run --release -p chaic-eval --example
-//! placements -- 300`.
+//! Measures what the heights of objects reveal about the goal: `cargo run --release -p chaic-eval
+//! --example placements -- 300`.
 //!
 //! For each indoor task, prints the share of wanted classes among the possible targets on the floor,
 //! on furniture, and above the reach of a child. Uses as many generated episodes of each task as the

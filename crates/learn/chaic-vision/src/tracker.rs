@@ -133,6 +133,19 @@ impl Measurement {
 /// Depths differ by at least this much between the points of an object, meters.
 const MIN_DEPTH_ERROR_M: f32 = 0.05;
 
+/// Returns the pixel of a point, the depth of the point and the depth in the image, meters; `None`
+/// outside the image.
+fn depths_at(point: Vec3, depth_m: &[f32], camera: &Camera) -> Option<([u32; 2], f32, f32)> {
+    let size = Vec2::new(camera.width as f32, camera.height as f32);
+    let (px, depth) = camera.project(point)?;
+    if px.cmplt(Vec2::ZERO).any() || px.cmpge(size).any() {
+        return None;
+    }
+    let [column, row] = [px.x as u32, px.y as u32];
+    let visible = depth_m[row as usize * camera.width as usize + column as usize];
+    Some(([column, row], depth, visible))
+}
+
 /// Tracked object.
 #[derive(Clone, Debug)]
 struct Track {
@@ -221,20 +234,14 @@ impl Tracker {
     /// Returns one pixel of each track that was missed in this image although the depth at its place
     /// is that of the object. The pixel targets it like a detection.
     pub fn missed(&self, now: Frame, depth_m: &[f32], camera: &Camera) -> Vec<(TrackId, [u32; 2])> {
-        let size = Vec2::new(camera.width as f32, camera.height as f32);
         let is_missed = |t: &&Track| {
             t.last_seen < now && !t.is_carried && !t.is_released && !self.held.contains(&t.id)
         };
         let pixel = |track: &Track| {
-            let (px, depth) = camera.project(track.position)?;
-            if px.cmplt(Vec2::ZERO).any() || px.cmpge(size).any() {
-                return None;
-            }
-            let [column, row] = [px.x as u32, px.y as u32];
-            let visible_m = depth_m[row as usize * camera.width as usize + column as usize];
+            let (pixel, depth, visible_m) = depths_at(track.position, depth_m, camera)?;
             let thickness_m = extents_m(track.label).into_iter().fold(f32::MAX, f32::min);
             let is_there = (visible_m - depth).abs() <= (0.5 * thickness_m).max(MIN_DEPTH_ERROR_M);
-            is_there.then_some((track.id, [column, row]))
+            is_there.then_some((track.id, pixel))
         };
         self.tracks.iter().filter(is_missed).filter_map(pixel).collect()
     }
@@ -246,17 +253,14 @@ impl Tracker {
         /// Objects with fewer expected pixels may be missed by the detector.
         const MIN_EXPECTED_PX: f32 = 100.0;
         let focal_px = camera.focal_px();
-        let size = Vec2::new(camera.width as f32, camera.height as f32);
         let (min_log_odds, decrease) = (self.config.log_odds_range[0], self.config.miss_log_odds);
         for track in self.tracks.iter_mut().filter(|t| t.last_seen < now) {
             if self.held.contains(&track.id) {
                 continue;
             }
-            let Some((px, depth)) = camera.project(track.position) else { continue };
-            if px.cmplt(Vec2::ZERO).any() || px.cmpge(size).any() {
+            let Some((_, depth, visible_depth)) = depths_at(track.position, depth_m, camera) else {
                 continue;
-            }
-            let visible_depth = depth_m[px.y as usize * camera.width as usize + px.x as usize];
+            };
             let mut extents = extents_m(track.label);
             extents.sort_by(f32::total_cmp);
             let expected_px = extents[0] * extents[1] * (focal_px / depth) * (focal_px / depth);

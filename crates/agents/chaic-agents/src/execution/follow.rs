@@ -18,8 +18,7 @@ const STAND_FRAMES: u32 = 3;
 const LOST_M: f32 = 0.9;
 /// Turns to search for a lost person: a full circle with a field of view of 90 degrees.
 const SEARCH_TURNS: u32 = 18;
-
-/// A person nearer than this may want to pass, meters.
+/// A person nearer than this may want to pass, meters. Ours, as all constants of giving way.
 const CLOSE_M: f32 = 1.5;
 /// Time for which it must be so near, frames.
 const CLOSE_FRAMES: Frame = 24;
@@ -31,6 +30,8 @@ const ASIDE_M: f32 = 2.0;
 const ASIDE_RANGE_M: f32 = 4.0;
 /// Free space around the body at the spot aside, meters: the width of another body.
 const ROOM_M: f32 = 0.55;
+/// Arrival distance of the spot aside, meters.
+const ASIDE_ARRIVAL_M: f32 = 0.3;
 
 /// Result of one following step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,7 +50,7 @@ pub struct Follower {
     n_turns: u32,
     /// Frame since which the person has been in the way.
     close_since: Option<Frame>,
-    /// Where the agent gives way.
+    /// Spot aside to which the agent walks, and the frame in which it was chosen.
     aside: Option<(Vec2, Frame)>,
 }
 
@@ -77,7 +78,7 @@ impl Follower {
         let (spot, since) = self.aside?;
         if now < since + ASIDE_FRAMES
             && let NavigationStep::Act(action) =
-                navigator.step(memory, &Destination::near(spot, 0.3))
+                navigator.step(memory, &Destination::near(spot, ASIDE_ARRIVAL_M))
         {
             return Some(action);
         }

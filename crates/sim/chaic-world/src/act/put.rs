@@ -299,12 +299,11 @@ impl World {
         let is_aside = set_down && on.is_none();
         // An agent may have moved to the spot meanwhile.
         let is_taken = is_aside && !self.is_free_floor(object, at);
-        let at = match on.filter(|_| set_down) {
+        // Another agent may have put something there meanwhile.
+        let radius = self.object(object).0.half_longer_side_m();
+        let at = match on {
             _ if is_taken => self.set_down_spot(agent, object),
-            // Another agent may have put something there meanwhile.
-            Some(place)
-                if !self.is_free_for(object, at, self.object(object).0.half_longer_side_m()) =>
-            {
+            Some(place) if set_down && !self.is_free_for(object, at, radius) => {
                 self.free_spot_on(place, object, self.person(agent).pose.position, &[])
             }
             _ => at,

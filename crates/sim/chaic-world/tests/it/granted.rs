@@ -107,6 +107,19 @@ fn holders_containers_and_deliveries_follow_the_objects() {
 }
 
 #[test]
+fn a_running_put_in_is_granted_behavior() {
+    let mut w = rooms();
+    for action in [pick_up(nth(0), Hand::Left), pick_up(nth(1), Hand::Right)] {
+        assert_eq!(run(&mut w, A, action).0, Outcome::Success);
+    }
+    w.submit(A, Action::PutIn).expect("the agent waits");
+    w.tick();
+    let seen = granted(&w, Grants { behavior: true, ..STATE }).behavior;
+    let actions: Vec<_> = seen.iter().map(|b| (b.action, b.outcome)).collect();
+    assert_eq!(actions, [(Action::PutIn, None)]);
+}
+
+#[test]
 fn the_layout_has_rooms_doorways_walls_and_fixed_furniture() {
     let w = rooms();
     let layout = w.briefing(B, STATE, 0).layout.expect("it is granted");

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use chaic_core::action::Hand;
-use chaic_core::observation::{FrameHistorySpec, Grants, SensorConfig};
+use chaic_core::observation::{Grants, SensorConfig};
 use chaic_core::rng::RngStream;
 use chaic_core::{Action, AgentId, EntityId, Target, TaskId};
 use chaic_env::{
@@ -169,26 +169,6 @@ fn one_pass_observes_each_turn_once() {
     assert!(first.iter().all(|depth| *depth >= 0.0), "a new turn");
     assert!(second.iter().all(|depth| *depth == -1.0), "the same turn");
     assert!(batch.observation(1).is_some());
-}
-
-#[test]
-fn a_repeated_observation_keeps_its_frame_history() {
-    let bundled = bundled();
-    let spec = FrameHistorySpec { image_size: 8, every_frames: 1, max_len: 4 };
-    let sensors = SensorConfig { frame_history: Some(spec), ..ALL };
-    let envs = (0..2).map(|n| env(&bundled, n, Grants::IDS, sensors)).collect();
-    let mut batch = EnvBatch::new(envs).unwrap();
-    let mut buffers = Buffers::new(batch.layout());
-    Passes::Two.run(&mut batch, &mut buffers);
-    assert!(batch.submit(0, Action::TurnLeft) && batch.submit(1, Action::TurnLeft));
-    Passes::Two.run(&mut batch, &mut buffers);
-    let n_images = |batch: &EnvBatch| batch.observation(1).unwrap().frame_history.len();
-    let before = n_images(&batch);
-    assert!(before > 0);
-    // Only the other environment goes on.
-    assert!(batch.submit(0, Action::TurnLeft));
-    Passes::Two.run(&mut batch, &mut buffers);
-    assert_eq!(n_images(&batch), before);
 }
 
 #[test]

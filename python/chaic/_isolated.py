@@ -16,13 +16,17 @@ from typing import Any
 
 from chaic import _chaic
 
+#: Maximum length of a command in JSON. Linux allows 128 KiB for one argument, which also holds the readable paths.
+_MAX_COMMAND = 100_000
+
 _CODE = "import sys, json; sys.path[:] = json.loads(sys.argv[2]); from chaic._isolated import main; main(sys.argv[1])"
 
 
 def command_line(maker: Callable[[], Any], images: Sequence[str], image_size: int) -> str:
     """Returns the shell command of a process that serves helpers that ``maker`` creates.
 
-    Raises ``ValueError`` if another process cannot import ``maker``: it must be defined in a file.
+    Raises ``ValueError`` if another process cannot import ``maker``: it must be defined in a file. The same holds if its
+    arguments are too large for a command.
     """
     main_file = _main_file()
     try:
@@ -39,7 +43,13 @@ def command_line(maker: Callable[[], Any], images: Sequence[str], image_size: in
     }
     path = [str(Path(entry).absolute()) for entry in sys.path]
     words = [sys.executable, "-c", _CODE, json.dumps(task), json.dumps(path)]
-    return "exec " + shlex.join(words)
+    command = "exec " + shlex.join(words)
+    if len(json.dumps(command)) > _MAX_COMMAND:
+        raise ValueError(
+            f"the arguments of the helper are too large for a command: {len(pickled)} bytes; "
+            "load large data from a file, which read=[...] makes readable"
+        )
+    return command
 
 
 _UNREACHABLE = (
@@ -57,20 +67,26 @@ def without_partial(maker: Callable[[], Any]) -> Callable[..., Any]:
 def readable(maker: Callable[[], Any]) -> list[str]:
     """Returns the files and folders that the process needs: the interpreter, installed packages, the helper's file.
 
-    Folders of ``sys.path`` that contain the current folder are left out, except for the helper's own file or package.
+    Folders of ``sys.path`` that contain the current or the home folder are left out, except for the helper's own file or
+    package.
     """
-    here = Path.cwd()
+    protected = [Path.cwd(), Path(os.path.expanduser("~")).resolve()]
+
+    def is_too_wide(folder: Path) -> bool:
+        real = folder.resolve()
+        return any(path.is_relative_to(real) for path in protected)
+
     found = {sys.prefix, sys.base_prefix, sys.exec_prefix, str(Path(__file__).parent)}
     for entry in sys.path:
         folder = Path(entry).absolute()
-        if folder.exists() and not here.is_relative_to(folder):
+        if folder.exists() and not is_too_wide(folder):
             found.add(str(folder))
     module = sys.modules.get(getattr(without_partial(maker), "__module__", None) or "")
     file = getattr(module, "__file__", None) or _main_file()
     if file is not None:
         package = "." in module.__name__ if module is not None else False
         path = Path(file).absolute()
-        found.add(str(path.parent if package and not here.is_relative_to(path.parent) else path))
+        found.add(str(path.parent if package and not is_too_wide(path.parent) else path))
     main_file = _main_file()
     if main_file is not None:
         found.add(main_file)
@@ -98,7 +114,8 @@ def _maker(task: dict[str, Any]) -> Any:
         # As in multiprocessing, the script runs under another name, so its main part is skipped.
         script = types.ModuleType("__mp_main__")
         script.__file__ = task["main"]
-        code = compile(Path(task["main"]).read_text(), task["main"], "exec")
+        # The bytes may declare their encoding.
+        code = compile(Path(task["main"]).read_bytes(), task["main"], "exec")
         sys.modules["__main__"] = sys.modules["__mp_main__"] = script
         exec(code, script.__dict__)
     return pickle.loads(pickled)

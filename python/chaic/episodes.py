@@ -16,8 +16,11 @@ MAX_CACHED = 256
 #: Training split of tasks without bundled training episodes.
 FALLBACK_SPLIT = "gen:0..1000"
 
-#: Seeds of worlds are below this number.
+#: Drawn seeds of worlds are below this number.
 N_SEEDS = 2**31
+
+#: Largest seed of a world.
+MAX_SEED = 2**32 - 1
 
 
 def task_names(task: str | Sequence[str] | None) -> list[str]:
@@ -87,4 +90,6 @@ class EpisodeSource:
             episode, seed = self.get(options["episode"]), 0
         if options is not None and "seed" in options:
             seed = int(options["seed"])
+            if not 0 <= seed <= MAX_SEED:
+                raise ValueError(f"the option seed is {seed}, expected 0 to {MAX_SEED}")
         return episode, seed

@@ -54,7 +54,7 @@ def evaluate(
     shards: int | None = None,
     jobs: int = 1,
     tries: int = 3,
-    baselines: Sequence[str] = (),
+    baselines: str | Sequence[str] = (),
     **options: Any,
 ) -> Run:
     """Plays a benchmark as ``chaic.evaluate`` does, with its shards as Ray tasks of ``jobs`` cores each.
@@ -65,7 +65,7 @@ def evaluate(
     lines in results.jsonl. ``first`` and ``beside`` are deprecated names of ``n_episodes`` and ``baselines``.
     """
     if baselines:
-        options["baselines"] = tuple(baselines)
+        options["baselines"] = baselines
     _deprecated.rename_keys(options, RENAMED_OPTIONS)
     options.pop("quiet", None)
     if Path(out).exists() and any(Path(out).iterdir()):

@@ -47,6 +47,9 @@ class Helper(Protocol):
 Maker = Callable[[], Any]
 
 
+#: Maximum time limit of an isolated helper, seconds; about 30 years.
+MAX_LIMIT_S = 1e9
+
 #: Deprecated options of ``evaluate``, with their new names.
 RENAMED_OPTIONS = {"first": "n_episodes", "beside": "baselines"}
 
@@ -80,7 +83,7 @@ def evaluate(
     quiet: bool = False,
     limit_s: float = 600.0,
     isolate: bool = False,
-    read: Sequence[str | os.PathLike[str]] = (),
+    read: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = (),
     **options: Any,
 ) -> Run:
     """Plays a benchmark with Python helpers into the folder ``out``, and returns the run.
@@ -122,9 +125,12 @@ def evaluate(
     helpers += [(name, partial(TimeLimitedHelper, maker, watchdog)) for name, maker in makers.items()]
     if not helpers:
         raise ValueError("give a helper or baselines")
+    if options.get("episodes") is not None:
+        options["episodes"] = os.fspath(options["episodes"])
     options |= {"split": split if options.get("episodes") is None else None, "seeds": seeds}
     if tasks is not None:
         options["tasks"] = task_names(tasks)
+    read = [read] if isinstance(read, (str, os.PathLike)) else list(read)
     if read and not isolate:
         raise ValueError("read applies to isolated helpers only; give isolate=True with it")
     isolation = _isolation(makers, images, image_size, read, limit_s) if isolate else None
@@ -200,7 +206,7 @@ def _isolation(
         ],
         "readable": sorted(readable),
         "launcher": launcher(),
-        "decision_s": limit_s,
+        "decision_s": min(limit_s, MAX_LIMIT_S),
     }
 
 

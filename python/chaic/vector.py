@@ -62,6 +62,10 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
                 raise ValueError(
                     f"a vector environment has no part {part!r}; the parts are {', '.join(PARTS)}"
                 )
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError(f'unknown render mode {render_mode!r}; the mode is "rgb_array"')
+        if render_mode is not None and "rgb" not in self.parts:
+            raise ValueError('render_mode "rgb_array" returns the color images of the observation; add "rgb" to it')
         self.num_envs = num_envs
         self.render_mode = render_mode
         self.weights = reward_weights(reward)
@@ -273,7 +277,7 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
 
     def render(self) -> Any:
         """Returns the current color image of each helper."""
-        if self.render_mode == "rgb_array" and "rgb" in self._arrays:
+        if self.render_mode == "rgb_array":
             return tuple(self._arrays["rgb"].copy())
         return None
 

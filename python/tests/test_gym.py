@@ -68,6 +68,9 @@ def test_invalid_arguments_are_refused():
     for invalid in ([0, 0], [99, 0, 0], [0, 0, 32], [0.5, 0, 0], None, np.full(3, np.nan)):
         with pytest.raises(ValueError):
             env.step(invalid)
+    for seed in (-1, 2**32):
+        with pytest.raises(ValueError, match="option seed"):
+            env.reset(options={"seed": seed})
     with pytest.raises(ValueError):
         gymnasium.make(IDS["obstacle"], observation="smell")
     with pytest.raises(ValueError):
@@ -169,6 +172,10 @@ def test_invalid_vector_arguments_are_refused():
             vector.step(invalid)
     with pytest.raises(ValueError):
         make(0)
+    with pytest.raises(ValueError, match="unknown render mode"):
+        HelperVectorEnv("obstacle", render_mode="human")
+    with pytest.raises(ValueError, match='add "rgb"'):
+        HelperVectorEnv("obstacle", observation="proprioception", render_mode="rgb_array")
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import sys
 from functools import partial
@@ -11,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import chaic
+from chaic._isolated import readable
 
 OPTIONS = {"tasks": "low_target", "split": "train", "n_episodes": 1, "jobs": 2, "quiet": True}
 
@@ -94,7 +96,7 @@ def test_isolated_helpers_act_like_helpers_in_process(tmp_path, helpers):
 
 def test_helper_arguments_reach_the_process(tmp_path, helpers):
     maker = {"waiter": partial(helpers.Waiter, 50)}
-    run = chaic.evaluate(maker, isolate=True, out=tmp_path / "run", **OPTIONS)
+    run = chaic.evaluate(maker, isolate=True, limit_s=math.inf, out=tmp_path / "run", **OPTIONS)
     assert not run.records()["failed"].any()
 
 
@@ -112,6 +114,19 @@ def test_an_isolated_helper_cannot_read_caller_or_home(tmp_path, helpers, monkey
         assert len(found["home"]) < len(os.listdir(Path.home()))
 
 
+def test_folders_that_contain_the_home_or_the_current_folder_are_not_readable(tmp_path, helpers, monkeypatch):
+    folder = tmp_path / "mine"
+    (folder / "inner").mkdir()
+    monkeypatch.chdir(tmp_path)
+    assert str(folder) in readable(helpers.Turner)
+    monkeypatch.setenv("HOME", str(folder))
+    assert str(folder) not in readable(helpers.Turner)
+    monkeypatch.setenv("HOME", str(tmp_path / "other"))
+    monkeypatch.chdir(folder / "inner")
+    assert str(folder) not in readable(helpers.Turner)
+    assert str(folder / "isolated_helpers.py") in readable(helpers.Turner)
+
+
 def test_a_process_serves_several_episodes(tmp_path, helpers):
     two = {**OPTIONS, "n_episodes": 2, "jobs": 1}
     run = chaic.evaluate(helpers.Counter, isolate=True, out=tmp_path / "run", **two)
@@ -126,8 +141,12 @@ def test_a_helper_that_cannot_be_imported_is_refused(tmp_path, helpers):
 
     with pytest.raises(ValueError, match="at the top level of a file"):
         chaic.evaluate(Local, isolate=True, out=tmp_path / "run", **OPTIONS)
+    large = {"waiter": partial(helpers.Waiter, bytes(100_000))}
+    with pytest.raises(ValueError, match="too large for a command"):
+        chaic.evaluate(large, isolate=True, out=tmp_path / "run", **OPTIONS)
     with pytest.raises(ValueError, match="isolate=True"):
         chaic.evaluate(helpers.Turner, read=["."], out=tmp_path / "run", **OPTIONS)
-    with pytest.raises(ValueError, match="exec-read"):
-        chaic.evaluate(helpers.Turner, isolate=True, read=["nowhere"], out=tmp_path / "run", **OPTIONS)
+    for read in (["nowhere"], "nowhere", Path("nowhere")):
+        with pytest.raises(ValueError, match="exec-read .*nowhere: "):
+            chaic.evaluate(helpers.Turner, isolate=True, read=read, out=tmp_path / "run", **OPTIONS)
     assert not (tmp_path / "run").exists()

@@ -184,6 +184,18 @@ def test_a_page_to_play_has_the_named_episodes(tmp_path):
     assert "shopping/gen/7" in html.unescape(page.path.read_text())
 
 
+def test_a_folder_of_episodes_is_a_path_or_a_string(tmp_path, episode):
+    fields = episode.as_dict()
+    del fields["generator"]
+    fields["setup"]["horizon"] = 100
+    folder = tmp_path / "episodes"
+    folder.mkdir()
+    (folder / "short.json").write_text(chaic.Episode.from_dict(fields).to_json())
+    for name, episodes in [("path", folder), ("string", str(folder))]:
+        run = chaic.evaluate(Turner, episodes=episodes, out=tmp_path / name, quiet=True)
+        assert run.records()["frames"].tolist() == [100]
+
+
 def test_records_match_results(tmp_path):
     run = chaic.evaluate(Turner, out=tmp_path / "run", **OPTIONS)
     records = run.records()

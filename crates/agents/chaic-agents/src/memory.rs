@@ -8,7 +8,8 @@ use chaic_core::capability::Gait;
 use chaic_core::geom::{Pose, Rect, horizontal_distance, to_xz};
 use chaic_core::observation::{Grants, JointCarrier, WorldState};
 use chaic_core::{
-    AgentId, Briefing, ClassId, FailureReason, Frame, Observation, Outcome, Role, Vec2, Vec3,
+    Action, AgentId, Briefing, ClassId, FailureReason, Frame, Observation, Outcome, Role, Vec2,
+    Vec3,
 };
 
 use crate::mapping::{
@@ -75,7 +76,7 @@ pub struct Memory {
     failed_places: BTreeSet<TrackId>,
     /// Lowest and highest top on which the agent can put something, meters.
     put_range_m: [f32; 2],
-    /// The agent's interactions (no locomotion), oldest first.
+    /// The agent's interactions (neither locomotion nor waiting), oldest first.
     pub history: Vec<ActionRecord>,
     /// Class of each track known so far.
     classes: BTreeMap<TrackId, ClassId>,
@@ -184,7 +185,7 @@ impl Memory {
             self.detect_deliveries(percepts);
         }
         if let Some((action, outcome)) = self.last
-            && action.subject().is_some()
+            && (action.subject().is_some() || action == Action::PutIn)
         {
             self.history.push(ActionRecord { frame: self.frame, action, outcome });
         }

@@ -7,7 +7,7 @@ use chaic_agents::partners;
 use chaic_core::agent::Thought;
 use chaic_core::memory_view::MemoryView;
 use chaic_core::observation::Images;
-use chaic_core::{Agent, AgentId, Frame, Target};
+use chaic_core::{Action, Agent, AgentId, Frame, Target};
 use chaic_episodes::Episode;
 use chaic_render::Scene;
 use chaic_world::World;
@@ -88,8 +88,8 @@ impl<T: Deref<Target = Trace>> AgentRerun<T> {
         self.seats.iter().map(|seat| (seat.agent, seat.status))
     }
 
-    /// Runs the agents that decide in the current frame, and advances the world by one frame; `None`
-    /// at the end of the trace, and once no agent runs.
+    /// Runs the agents that wait in the current frame, and advances the world by one frame; `None` at
+    /// the end of the trace, and once no agent runs.
     ///
     /// # Errors
     /// If the trace does not fit the world.
@@ -101,39 +101,45 @@ impl<T: Deref<Target = Trace>> AgentRerun<T> {
         Ok(self.playback.step()?.map(|_| moments))
     }
 
+    /// Asks each waiting agent for its action, as the episode did. The trace lacks the choice of an
+    /// agent that an earlier choice of the same frame engaged in a joint lift.
     fn decide(&mut self) -> Vec<RerunMoment> {
         let AgentRerun { playback, renderer, seats, spare_images } = self;
+        let world = playback.world();
+        let frame = world.state().frame;
         let takes_over = playback.header().helper_takes_over();
         let mut moments = Vec::new();
-        for recorded in playback.due_decisions() {
-            let running = |seat: &&mut Seat| {
-                seat.agent == recorded.agent && seat.status == RerunStatus::Equal
-            };
+        for id in world.waiting() {
+            let running = |seat: &&mut Seat| seat.agent == id && seat.status == RerunStatus::Equal;
             let Some(seat) = seats.iter_mut().find(running) else { continue };
-            let observers = [(seat.agent, &seat.slot)];
-            let Some(rendered) = renderer.observe(playback.world(), &observers, spare_images).pop()
-            else {
+            let mut due = playback.due_decisions();
+            let recorded = due.find(|decision| decision.agent == id).map(|d| d.action);
+            let observers = [(id, &seat.slot)];
+            let Some(rendered) = renderer.observe(world, &observers, spare_images).pop() else {
                 continue;
             };
             let Driver::Agent(agent) = &mut seat.slot.driver else { continue };
-            let observes = seat.agent == AgentId::HELPER
-                && takes_over.is_some_and(|frame| recorded.frame < frame);
-            if observes {
+            if id == AgentId::HELPER && takes_over.is_some_and(|from| frame < from) {
                 agent.observe(&rendered.observation);
-                let action = recorded.action.map(Target::Entity);
-                seat.slot.submitted = Some((action, recorded.action));
+                // As in a continuation, whose helper waits if its choice is not recorded.
+                let action = recorded.unwrap_or(Action::Wait { frames: 1 });
+                seat.slot.submitted = Some((action.map(Target::Entity), action));
                 spare_images.push(rendered.into_images());
                 continue;
             }
             let chosen = agent.act(&rendered.observation).ok();
-            let equal = chosen.filter(|action| rendered.resolve(*action) == recorded.action);
+            let submitted = chosen.map(|action| (action, rendered.resolve(action)));
+            let equal =
+                submitted.filter(|(_, resolved)| recorded.is_none_or(|action| action == *resolved));
             match (equal, agent.memory_view()) {
-                (None, _) => seat.status = RerunStatus::Differs(recorded.frame),
+                (None, _) => seat.status = RerunStatus::Differs(frame),
                 (Some(_), None) => seat.status = RerunStatus::Unavailable,
-                (Some(action), Some(memory)) => {
-                    seat.slot.submitted = Some((action, recorded.action));
-                    let (frame, agent, thought) = (recorded.frame, seat.agent, agent.thought());
-                    moments.push(RerunMoment { frame, agent, memory, thought });
+                (Some(_), Some(memory)) => {
+                    seat.slot.submitted = equal;
+                    if recorded.is_some() {
+                        let (agent, thought) = (id, agent.thought());
+                        moments.push(RerunMoment { frame, agent, memory, thought });
+                    }
                 }
             }
             spare_images.push(rendered.into_images());

@@ -170,6 +170,20 @@ impl FromStr for FaultKind {
     }
 }
 
+/// Checks that the rates of all faults together are at most 1: a request has one fault at most.
+///
+/// # Errors
+/// If they are more.
+pub fn check_rates(faults: &[(FaultKind, f64)]) -> Result<(), String> {
+    /// Maximum rounding error of a sum.
+    const TOLERANCE: f64 = 1e-9;
+    let total: f64 = faults.iter().map(|(_, rate)| rate).sum();
+    if total > 1.0 + TOLERANCE {
+        return Err("the rates of all --fault options add up to more than 1; lower them".to_owned());
+    }
+    Ok(())
+}
+
 /// Random draw for one request.
 #[derive(Clone, Copy, Debug)]
 pub struct Draw {
@@ -214,6 +228,19 @@ mod tests {
         assert!((900..1_100).contains(&n(Some(FaultKind::Empty))));
         for kind in FaultKind::ALL {
             assert_eq!(kind.name().parse(), Ok(kind));
+        }
+    }
+
+    #[test]
+    fn rates_beyond_1_are_refused() {
+        let rates = |rates: &[f64]| -> Vec<(FaultKind, f64)> {
+            rates.iter().map(|rate| (FaultKind::Reset, *rate)).collect()
+        };
+        for allowed in [&[1.0][..], &[0.1; 10], &[0.7, 0.1, 0.1, 0.1]] {
+            assert_eq!(check_rates(&rates(allowed)), Ok(()), "{allowed:?}");
+        }
+        for refused in [&[0.6, 0.5][..], &[1.0, 0.001]] {
+            assert!(check_rates(&rates(refused)).is_err(), "{refused:?}");
         }
     }
 }

@@ -58,6 +58,8 @@ pub struct Options {
     pub key: Option<String>,
     /// True if it rejects JSON schemas, as some servers do.
     pub refuses_schema: bool,
+    /// Reported reason for the end of each answer; `length` for one that was cut off.
+    pub finish_reason: &'static str,
     /// Target of redirects; the server then redirects all completion requests.
     pub redirects_to: Option<String>,
     /// Source of answers.
@@ -74,6 +76,7 @@ impl Default for Options {
             stall: Duration::from_secs(2),
             key: None,
             refuses_schema: false,
+            finish_reason: "stop",
             redirects_to: None,
             response_mode: ResponseMode::Script,
         }
@@ -305,7 +308,9 @@ impl Shared {
             ResponseMode::Function(answer) => answer(&question),
         };
         self.stats().answered += 1;
-        write_response(stream, 200, &[], completion(&question, &text).to_string().as_bytes())
+        let mut body = completion(&question, &text);
+        body["choices"][0]["finish_reason"] = json!(self.options.finish_reason);
+        write_response(stream, 200, &[], body.to_string().as_bytes())
     }
 }
 

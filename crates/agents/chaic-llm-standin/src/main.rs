@@ -4,9 +4,12 @@
 use std::process::ExitCode;
 use std::time::Duration;
 
-use chaic_llm_standin::faults::FaultKind;
+use chaic_llm_standin::faults::{FaultKind, check_rates};
 use chaic_llm_standin::{Options, StandIn};
 use clap::Parser;
+
+/// Exit code of an invalid request, as of the parser of the command line.
+const USAGE: u8 = 2;
 
 /// A scripted server in place of a language model endpoint. Scores reached with it are NOT those of
 /// a language model.
@@ -19,7 +22,8 @@ struct Arguments {
     /// Time per response, milliseconds.
     #[arg(long, default_value_t = 0)]
     latency_ms: u64,
-    /// Fault kind and its rate, for example 429=0.3; can be repeated.
+    /// Fault kind and its rate, for example 429=0.3; can be repeated. All rates together are at
+    /// most 1.
     #[arg(long, value_name = "KIND=RATE", value_parser = fault)]
     fault: Vec<(FaultKind, f64)>,
     /// Delay of timeout and slow-drip faults, milliseconds.
@@ -44,6 +48,10 @@ fn fault(text: &str) -> Result<(FaultKind, f64), String> {
 
 fn main() -> ExitCode {
     let Arguments { port, latency_ms, fault, stall_ms, seed, refuse_schema } = Arguments::parse();
+    if let Err(problem) = check_rates(&fault) {
+        eprintln!("error: {problem}");
+        return ExitCode::from(USAGE);
+    }
     let options = Options {
         port,
         faults: fault,

@@ -11,7 +11,7 @@ use crate::exchange::{ChatRequest, DecisionRecord, Exchange, Fault, FaultKind, R
 use crate::rate_limiter::{self, Admission, RateLimiter, Spent};
 use crate::record::{self, DecisionLog, DecisionLogWriter, RecordEntry, RecordHeader};
 use crate::session::{Session, Source};
-use crate::settings::FailureAction;
+use crate::settings::{AnswerForm, FailureAction};
 
 /// Requests of one agent in one episode run, with its record.
 pub struct LlmClient<'a> {
@@ -105,6 +105,7 @@ impl<'a> LlmClient<'a> {
                 return Err(Halted);
             }
         };
+        self.pause_if_schema_required(&exchange)?;
         self.conversation.push(self.session, RecordEntry::Exchange(Box::new(exchange.clone())))?;
         Ok(exchange)
     }
@@ -219,6 +220,21 @@ impl<'a> LlmClient<'a> {
             return Err(Halted);
         }
         Ok(Fault { kind: FaultKind::Budget, status: None, detail })
+    }
+
+    /// Pauses the run if the settings require the JSON schema that the endpoint refused. The refusal is
+    /// not recorded, so that another endpoint can continue the run.
+    fn pause_if_schema_required(&self, exchange: &Exchange) -> Result<(), Halted> {
+        let Reply::Failed(fault) = &exchange.reply else { return Ok(()) };
+        let is_required = self.session.settings.request.answer_format == AnswerForm::Schema;
+        if !is_required || fault.kind != FaultKind::Schema {
+            return Ok(());
+        }
+        self.session.halt(format!(
+            "the endpoint refuses a JSON schema ({fault}); resume with another endpoint, or start a run \
+             with request.answer_format \"auto\" or \"text\""
+        ));
+        Err(Halted)
     }
 
     fn pause_if_exhausted(&self, fault: &Fault, attempts: u32) -> Result<(), Halted> {

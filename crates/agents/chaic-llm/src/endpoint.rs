@@ -170,8 +170,7 @@ impl Client {
     ) -> Failure {
         // The description of a key error may repeat part of the key.
         let is_about_key = matches!(status, 401 | 403);
-        let text = if is_about_key { String::new() } else { summary(text) };
-        let text = self.key.mask(text);
+        let text = if is_about_key { String::new() } else { self.masked_summary(text) };
         let about_schema =
             ["response_format", "json_schema", "schema"].iter().any(|w| text.contains(w));
         let refuses_schema =
@@ -221,8 +220,9 @@ impl Client {
                 format!("the answer is not a chat completion: {problem}"),
             )
         };
-        let completion: Completion =
-            serde_json::from_value(value).map_err(|e| wrong(&summary(&e.to_string())))?;
+        // The error quotes the unexpected value.
+        let completion: Completion = serde_json::from_value(value)
+            .map_err(|e| wrong(&self.masked_summary(&e.to_string())))?;
         let choice = completion.choices.into_iter().next().ok_or_else(|| wrong("no choice"))?;
         let text =
             message_text(&choice.message.content).or(choice.message.refusal).unwrap_or_default();
@@ -231,8 +231,14 @@ impl Client {
             Some(usage) => usage,
             None => Usage { answer: tokens::estimate(&text) as u64, ..self.max_usage(request) },
         };
-        let finish = choice.finish_reason.map(|reason| self.key.mask(summary(&reason)));
+        let finish = choice.finish_reason.map(|reason| self.masked_summary(&reason));
         Ok(Reply::Answer { text, finish, usage, latency_ms: latency.as_millis() as u64 })
+    }
+
+    /// Returns the start of a foreign text as one line. The key is masked first: a cut would leave a
+    /// part of it.
+    fn masked_summary(&self, text: &str) -> String {
+        summary(&self.key.mask(text.to_owned()))
     }
 }
 
@@ -329,6 +335,29 @@ mod tests {
         let counted = usage_of(&usage).expect("the prompt tokens are counted");
         assert_eq!((counted.prompt, counted.answer), (1_000_000_000, 0));
         assert_eq!(usage_of(&json!({ "prompt_tokens": "many" })), None);
+    }
+
+    #[test]
+    fn descriptions_of_failures_contain_no_part_of_the_key() {
+        const KEY: &str = "sk-sesame-0123456789";
+        let client =
+            Client::with_key(&settings("http://h/v1", EndpointKind::Openai), Key::new(KEY));
+        let (model, messages) = ("m".to_owned(), Vec::new());
+        let purpose = crate::exchange::Purpose::Decide;
+        let request = ChatRequest { model, purpose, messages, n_schema_plans: None };
+        for body in [
+            json!({ "choices": format!("the key is {KEY}") }),
+            json!({ "choices": [{ "message": KEY }] }),
+        ] {
+            let bytes = body.to_string().into_bytes();
+            let failure = client.parse_reply(&request, bytes, Duration::ZERO).unwrap_err();
+            let detail = failure.fault.detail;
+            assert!(detail.contains("[key]") && !detail.contains("sesame"), "{detail}");
+        }
+        // The limit of a description is in the middle of the key.
+        let text = "x".repeat(MAX_DETAIL - 9) + KEY;
+        let detail = client.refusal(400, &text, None, &request).fault.detail;
+        assert!(!detail.contains("sk-"), "{detail}");
     }
 
     #[test]

@@ -112,7 +112,12 @@ impl LlmError {
     pub fn is_usage(&self) -> bool {
         matches!(
             self,
-            LlmError::Config { .. } | LlmError::Setting { .. } | LlmError::SettingDiffers { .. }
+            LlmError::Config { .. }
+                | LlmError::NoKey { .. }
+                | LlmError::NotNamed { .. }
+                | LlmError::Setting { .. }
+                | LlmError::SettingDiffers { .. }
+                | LlmError::Template { .. }
         )
     }
 

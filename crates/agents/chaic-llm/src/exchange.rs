@@ -191,6 +191,11 @@ pub enum Reply {
 }
 
 impl Reply {
+    /// Returns whether the endpoint cut the answer off at the maximum length.
+    pub fn is_truncated(&self) -> bool {
+        matches!(self, Reply::Answer { finish: Some(reason), .. } if reason == "length")
+    }
+
     /// Returns the digest of the reply.
     pub fn hash(&self) -> ContentHash {
         let bytes = serde_json::to_vec(self).expect("a reply has string keys");

@@ -178,7 +178,7 @@ impl LanguagePolicy {
                 return Ok((prompt, Outcome::Failed(failure_source(&exchange))));
             };
             *latency_ms += ms;
-            messages.push(message(Role::Assistant, &text));
+            messages.push(message(Role::Assistant, non_empty(&text)));
             let choose = self.or_halt(self.session.templates.choose(&prompt.facts))?;
             messages.push(message(Role::User, &choose));
             purpose = Purpose::Choose;
@@ -192,7 +192,8 @@ impl LanguagePolicy {
                     text
                 }
                 Reply::Failed(fault) if fault.kind == FaultKind::Schema => {
-                    self.disable_schema(&fault.detail)?;
+                    // If the settings require a schema, the client has paused the run.
+                    self.by_schema = false;
                     prompt = self.prompt(context, listed)?;
                     messages = first(&prompt.text);
                     continue;
@@ -201,7 +202,11 @@ impl LanguagePolicy {
                     return Ok((prompt, Outcome::Failed(failure_source(&exchange))));
                 }
             };
-            let problem = match answer::parse(text, &prompt.texts, self.by_schema) {
+            let parse = match exchange.reply.is_truncated() {
+                true => answer::parse_truncated,
+                false => answer::parse,
+            };
+            let problem = match parse(text, &prompt.texts, self.by_schema) {
                 Ok(answer::Choice { index, lenient }) => {
                     return Ok((prompt, Outcome::Chosen { index, lenient }));
                 }
@@ -213,9 +218,7 @@ impl LanguagePolicy {
             }
             purpose = Purpose::Retry;
             let repeated: String = text.chars().take(MAX_REPEATED).collect();
-            // Some endpoints refuse empty messages.
-            let repeated = if repeated.trim().is_empty() { "(nothing)" } else { &repeated };
-            messages.push(message(Role::Assistant, repeated));
+            messages.push(message(Role::Assistant, non_empty(&repeated)));
             let repeat = self.session.templates.repeat(&prompt.facts, &problem, self.by_schema);
             messages.push(message(Role::User, &self.or_halt(repeat)?));
         }
@@ -250,17 +253,6 @@ impl LanguagePolicy {
             self.count(name, n);
         }
         Ok(exchange)
-    }
-
-    /// Switches to text answers after the endpoint refused a JSON schema, if the settings allow.
-    fn disable_schema(&mut self, detail: &str) -> Result<(), Halted> {
-        if self.settings().answer_format == AnswerForm::Schema {
-            let hint = "set request.answer_format to \"auto\" or \"text\"";
-            self.session.halt(format!("the endpoint refuses a JSON schema ({detail}); {hint}"));
-            return Err(Halted);
-        }
-        self.by_schema = false;
-        Ok(())
     }
 
     /// Returns the longest prompt within the settings' limit.
@@ -353,6 +345,11 @@ impl LanguagePolicy {
         };
         self.conversation.record(&self.session, decided)
     }
+}
+
+/// Returns a message of the model, or a replacement if it is blank: some endpoints refuse empty messages.
+fn non_empty(text: &str) -> &str {
+    if text.trim().is_empty() { "(nothing)" } else { text }
 }
 
 fn failure_source(exchange: &Exchange) -> DecisionSource {

@@ -166,10 +166,14 @@ pub struct PersonFacts {
     pub distance_m: String,
     /// Distance of a lost child from the agent's partner.
     pub m_from_partner: Option<String>,
-    /// Objects that it is known to have taken.
+    /// Objects that it is known to have taken, oldest first.
     pub picked_up: Vec<String>,
+    /// Number of omitted objects that it took earlier.
+    pub n_omitted_picked_up: usize,
     /// Last known held objects.
     pub holds: Vec<String>,
+    /// Number of omitted held objects.
+    pub n_omitted_held: usize,
     /// Other observed interactions, oldest first.
     pub actions: Vec<Interaction>,
     /// Number of omitted earlier interactions.
@@ -261,7 +265,7 @@ mod tests {
     use chaic_agents::decision::Subject;
     use chaic_core::ClassId;
 
-    use super::gather::keep_nearest;
+    use super::gather::{keep_last, keep_nearest};
     use super::*;
 
     #[test]
@@ -294,5 +298,12 @@ mod tests {
             [Plan::Explore, Plan::PickUp(it(30)), Plan::PickUp(it(31)), Plan::TurnAround]
         );
         assert_eq!(keep_nearest(&plans, 60), plans);
+    }
+
+    #[test]
+    fn the_last_entries_are_kept_and_the_others_counted() {
+        for (limit, kept, n_omitted) in [(5, &[1, 2, 3][..], 0), (2, &[2, 3], 1), (0, &[], 3)] {
+            assert_eq!(keep_last(vec![1, 2, 3], limit), (kept.to_vec(), n_omitted));
+        }
     }
 }

@@ -34,6 +34,38 @@ pub fn path(run: &Path, key: &RunKey, agent: AgentId) -> PathBuf {
     folder(run).join(key.task.name()).join(&key.helper).join(name)
 }
 
+/// Returns the episode run of an agent's record, by the episode's id with or without the task. Without `seed`,
+/// selects the lowest one.
+///
+/// # Errors
+/// If the folder or the record cannot be read, or the record is of another episode run.
+pub fn find(
+    run: &Path,
+    episode: &str,
+    helper: &str,
+    seed: Option<u32>,
+    agent: AgentId,
+) -> Result<Option<RunKey>> {
+    let seed_of = |record: &Path| {
+        // llm/TASK/HELPER/EPISODE-sSEED.AGENT.jsonl
+        let part = |up: usize| record.iter().rev().nth(up).and_then(|part| part.to_str());
+        let name = part(0)?.strip_suffix(&format!(".{agent}.jsonl"))?;
+        let prefix = format!("{}-s", slug(part(2)?.parse().ok()?, episode));
+        let found: u32 = name.strip_prefix(&prefix)?.parse().ok()?;
+        (part(1) == Some(helper) && seed.is_none_or(|seed| seed == found)).then_some(found)
+    };
+    let records = all(run)?.into_iter();
+    let found = records.filter_map(|record| Some((seed_of(&record)?, record))).min();
+    let Some((_, record)) = found else { return Ok(None) };
+    let key = DecisionLog::read(run, &record)?.header.key;
+    if path(run, &key, agent) != record {
+        let problem =
+            format!("is of {} with helper {}, seed {}", key.episode, key.helper, key.seed);
+        return Err(LlmError::Unreadable { path: record, line: 1, problem });
+    }
+    Ok(Some(key))
+}
+
 /// First line of a record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -161,13 +193,18 @@ impl DecisionLogWriter {
     /// Creates a record in a run folder, or continues an existing record of the same agent.
     ///
     /// # Errors
-    /// If it is a link or no regular file, or cannot be written.
+    /// If it is a link or no regular file, or cannot be read or written.
     pub fn open(run: &Path, path: &Path, header: &RecordHeader) -> Result<DecisionLogWriter> {
         create_folders_below(run, path.parent().unwrap_or(run))?;
         let before = match kind_below(run, path)? {
             EntryKind::Missing => None,
-            // A damaged record, or one of another agent, is replaced.
-            _ => DecisionLog::read(run, path).ok().filter(|record| record.header == *header),
+            // A damaged record, or one of another agent, is replaced; one that the system cannot read
+            // now is kept.
+            _ => match DecisionLog::read(run, path) {
+                Ok(record) => Some(record).filter(|record| record.header == *header),
+                Err(LlmError::Unreadable { .. }) => None,
+                Err(error) => return Err(error),
+            },
         };
         let is_new = before.is_none();
         let refused = || LlmError::io("write", path);
@@ -275,6 +312,34 @@ mod tests {
         let run = path.parent().unwrap();
         let mut recorder = DecisionLogWriter::open(run, path, &header()).unwrap();
         entries.iter().for_each(|e| recorder.push(e.clone()).unwrap());
+    }
+
+    #[test]
+    fn a_record_is_found_by_its_episode() {
+        let dir = tempfile::tempdir().unwrap();
+        let run = dir.path();
+        let key = |seed| RunKey { seed, ..header().key };
+        for seed in [10, 2] {
+            let header = RecordHeader::new(&key(seed), AgentId::HELPER, "m");
+            DecisionLogWriter::open(run, &path(run, &key(seed), AgentId::HELPER), &header).unwrap();
+        }
+        let found = |episode: &str, helper: &str, seed, agent| {
+            find(run, episode, helper, seed, agent).unwrap().map(|key| key.seed)
+        };
+        let me = AgentId::HELPER;
+        for episode in ["obstacle/test/00", "test/00"] {
+            assert_eq!(found(episode, "llm", None, me), Some(2), "{episode}");
+            assert_eq!(found(episode, "llm", Some(10), me), Some(10), "{episode}");
+        }
+        assert_eq!(found("test/00", "llm", Some(1), me), None);
+        assert_eq!(found("test/00", "vlm", None, me), None);
+        assert_eq!(found("test/0", "llm", None, me), None);
+        assert_eq!(found("test/00", "llm", None, AgentId::PARTNER), None);
+        // A forged name.
+        let forged = path(run, &key(1), me);
+        fs::rename(path(run, &key(2), me), forged).unwrap();
+        let error = find(run, "test/00", "llm", None, me).unwrap_err().to_string();
+        assert!(error.contains("is of obstacle/test/00 with helper llm, seed 2"), "{error}");
     }
 
     #[test]

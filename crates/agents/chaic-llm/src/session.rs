@@ -96,7 +96,7 @@ impl Session {
     /// ones.
     ///
     /// # Errors
-    /// If they differ, or a file cannot be written.
+    /// If they differ, or a file cannot be read or written.
     pub fn attach(&self, run: &Path) -> Result<()> {
         let folder = record::folder(run);
         create_folders(run)?;
@@ -258,8 +258,12 @@ fn compare(run: &Path, recorded: &Recorded, current: &Recorded) -> Result<()> {
 fn spent_before(run: &Path, price: &Price) -> Result<Spent> {
     let mut spent = Spent::default();
     for path in record::all(run)? {
-        // A damaged record is replaced when its episode is played again.
-        let Ok(record) = DecisionLog::read(run, &path) else { continue };
+        let record = match DecisionLog::read(run, &path) {
+            Ok(record) => record,
+            // A damaged record is replaced when its episode is played again.
+            Err(LlmError::Unreadable { .. }) => continue,
+            Err(error) => return Err(error),
+        };
         for entry in record.entries {
             if let RecordEntry::Exchange(exchange) = entry {
                 spent.add(Spent::new(exchange.requests(), exchange.usage(), price));

@@ -175,7 +175,9 @@ impl Templates {
                 self.prompt(&facts, question)?;
             }
             self.choose(&facts)?;
-            self.repeat(&facts, "because", true)?;
+            for schema in [true, false] {
+                self.repeat(&facts, "because", schema)?;
+            }
         }
         Ok(())
     }
@@ -231,6 +233,30 @@ mod tests {
     }
 
     #[test]
+    fn a_prompt_states_the_numbers_of_omitted_entries() {
+        let templates = Templates::load(None).unwrap();
+        let render = |facts: &PromptContext| templates.prompt(facts, Question::Schema).unwrap();
+        let mut facts = PromptContext::samples().swap_remove(0);
+        let prompt = render(&facts);
+        for expected in [
+            "Your actions (the last 1 of 4):",
+            "Picked up, as you saw: apple #32 (7 earlier omitted).",
+            "Held when last seen: apple #32 (6 more omitted).",
+            "Other actions that you saw (the last 1 of 3):",
+            "(the nearest 1 of 5):",
+            "5 more are omitted",
+        ] {
+            assert!(prompt.contains(expected), "{expected}: {prompt}");
+        }
+        facts.map.objects.clear();
+        assert!(
+            render(&facts).contains("\nUseful objects that you have seen: 4, all omitted here.")
+        );
+        facts.others[0].n_omitted_picked_up = 0;
+        assert!(render(&facts).contains("Picked up, as you saw: apple #32.\n"));
+    }
+
+    #[test]
     fn a_user_template_replaces_a_built_in_one() {
         let dir = tempfile::tempdir().unwrap();
         fs::write(dir.path().join("ask_text.txt"), "Say a number, {{ track }}.").unwrap();
@@ -251,6 +277,10 @@ mod tests {
             ("map.txt", "one\n{{ nonsense }}", "map.txt: line 2"),
             ("map.txt", "{% for x in map.objects %}", "map.txt"),
             ("plan.txt", "x", "plans.txt"),
+            ("ask_again.txt", "{% if not schema %}{{ nonsense }}{% endif %}", "ask_again.txt"),
+            // Variables of other tracks.
+            ("task.txt", "{{ disclosed.task }}", "task.txt"),
+            ("task_known.txt", "{{ wanted[0].name }}", "task_known.txt"),
             (
                 "map.txt",
                 "{% for a in range(9999) %}{% for b in range(9999) %}x{% endfor %}{% endfor %}",

@@ -232,6 +232,7 @@ pub fn evaluate(
     }
     let grants = grants(&granted)?;
     let sensors = sensors(&images, image_size)?;
+    let masked: Vec<PathBuf> = [out.clone()].into_iter().chain(keywords.episodes.clone()).collect();
     let request = keywords.request(names)?;
     // Threads of the run may outlive this call, so the flag (one byte) is leaked.
     let stop: &'static AtomicBool = Box::leak(Box::new(AtomicBool::new(false)));
@@ -239,7 +240,7 @@ pub fn evaluate(
         isolation.map(|options| depythonize(options)).transpose().map_err(wrong)?;
     let own_names: Vec<String> = makers.iter().map(|(name, _)| name.clone()).collect();
     let isolated = isolation.map_or(Ok(Vec::new()), |options| {
-        IsolatedHelper::create_all(&options, &own_names, grants, &out)
+        IsolatedHelper::create_all(&options, &own_names, grants, &masked)
     })?;
     let helpers = PyHelperRegistry { built_in, makers, grants, sensors, isolated, stop };
     let shard = shard.map_or(Ok(Shard::WHOLE), |shard| shard.parse().map_err(mistake))?;

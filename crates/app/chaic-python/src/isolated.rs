@@ -2,7 +2,7 @@
 
 use std::ffi::OsString;
 use std::fs::File;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -42,18 +42,18 @@ pub struct IsolatedHelper {
 }
 
 impl IsolatedHelper {
-    /// Creates all helpers of a run.
+    /// Creates all helpers of a run. Their processes cannot read the folders `masked`.
     pub fn create_all(
         options: &IsolationOptions,
         names: &[String],
         grants: Grants,
-        run: &Path,
+        masked: &[PathBuf],
     ) -> PyResult<Vec<IsolatedHelper>> {
         let launcher = Launcher::new(options.launcher.iter().map(OsString::from));
         let confinement = ConfinementOptions {
             is_trusted: false,
             readable: options.readable.clone(),
-            masked: vec![run.to_owned()],
+            masked: masked.to_vec(),
         };
         let decision = Duration::try_from_secs_f64(options.decision_s).map_err(mistake)?;
         let default = Limits::default();

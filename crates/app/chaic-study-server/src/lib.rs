@@ -26,6 +26,7 @@ mod server;
 mod sessions;
 mod store;
 mod token_bucket;
+mod write_timeout;
 
 pub use app::{Clock, Reporter};
 pub use error::{Result, ServerError};

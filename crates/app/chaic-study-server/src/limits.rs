@@ -18,6 +18,8 @@ pub const PARTICIPANTS_PER_SLOT: usize = 10;
 pub const HEADER_TIMEOUT: Duration = Duration::from_secs(30);
 /// Time in which a request must be answered, including the transfer of its body.
 pub const REQUEST_TIMEOUT: Duration = Duration::from_secs(60);
+/// Time in which a client must accept an answer: 100 kbit/s suffice for the page of 1.5 MB.
+pub const WRITE_TIMEOUT: Duration = Duration::from_secs(120);
 /// Time for which the end of the server waits for requests in progress.
 pub const STOP_TIMEOUT: Duration = Duration::from_secs(10);
 /// Threads that write files.

@@ -170,7 +170,9 @@ impl Log {
             let known = self.read_stored()?;
             let known =
                 known.split_inclusive('\n').filter(|line| is_of_page(plan, line)).skip(from);
-            if let Some(k) = known.zip(stored).position(|(known, sent)| known != *sent) {
+            let is_other =
+                |(known, sent): (&str, &&str)| known != *sent && !is_same_start(plan, known, sent);
+            if let Some(k) = known.zip(stored).position(is_other) {
                 return Err(wrong(k, "another record is stored"));
             }
         }
@@ -280,6 +282,19 @@ impl Log {
 /// Returns whether a stored line is one that the page has too.
 fn is_of_page(plan: &StudyPlan, line: &str) -> bool {
     plan.study().play.simulator == Simulator::Page || !line.starts_with(TRACE_BEGIN)
+}
+
+/// Returns whether two lines are the first record of one participant. In a study that the server simulates, the
+/// record of the page has the digest of the page instead of that of the study.
+fn is_same_start(plan: &StudyPlan, known: &str, sent: &str) -> bool {
+    let start = |line: &str| match DataRecord::parse(line) {
+        Ok(DataRecord::Start { format, version, code, slot, .. }) => {
+            Some((format, version, code, slot))
+        }
+        _ => None,
+    };
+    plan.study().play.simulator == Simulator::Server
+        && start(known).is_some_and(|known| start(sent) == Some(known))
 }
 
 /// Refuses records of a page that only the server writes.

@@ -29,10 +29,12 @@ use crate::access::{AllowedHosts, is_host_name};
 use crate::app::{App, Clock, Play, Reporter, n_play_threads};
 use crate::error::{Result, ServerError};
 use crate::limits::{
-    HEADER_TIMEOUT, IDLE_INTERVAL, MAX_CONNECTIONS, MAX_HEADER_BYTES, STOP_TIMEOUT, WRITER_THREADS,
+    HEADER_TIMEOUT, IDLE_INTERVAL, MAX_CONNECTIONS, MAX_HEADER_BYTES, STOP_TIMEOUT, WRITE_TIMEOUT,
+    WRITER_THREADS,
 };
 use crate::routes::router;
 use crate::store::{Counts, Store};
+use crate::write_timeout::WriteTimeout;
 
 /// Threads that handle requests.
 const THREADS: usize = 2;
@@ -191,7 +193,8 @@ async fn serve(listener: tokio::net::TcpListener, router: Router, stop: &AtomicB
             continue;
         };
         let service = TowerToHyperService::new(router.clone());
-        let connection = connections.watch(http.serve_connection(TokioIo::new(stream), service));
+        let stream = TokioIo::new(WriteTimeout::new(stream, WRITE_TIMEOUT));
+        let connection = connections.watch(http.serve_connection(stream, service));
         tokio::spawn(async move {
             // A broken connection concerns its client alone, who repeats the request.
             let _ = connection.await;

@@ -28,7 +28,6 @@ const SECS_PER_MINUTE: u64 = 60;
 ///
 /// Slots follow from the files ([`lowest_free_slot`]). A server that starts again counts the time-outs from its
 /// start.
-/// `chaic_study::SlotTable` has claims instead, which the files do not have.
 pub struct Store {
     plan: StudyPlan,
     folder: PathBuf,

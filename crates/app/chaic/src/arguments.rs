@@ -21,6 +21,7 @@ use std::ops::Range;
 
 use chaic_core::task::TASKS;
 use chaic_core::{AgentId, TaskId};
+use chaic_episodes::{SeedRange, Split};
 use clap::{Args, ColorChoice, Parser, Subcommand, ValueEnum};
 
 pub use self::bench::{
@@ -213,10 +214,15 @@ fn agent(text: &str) -> Result<AgentId, String> {
     found.ok_or_else(|| format!("no agent `{text}`; write partner, helper or child"))
 }
 
+/// Parses the seeds of `--split gen:A..B`.
 fn seed_range(text: &str) -> Result<Range<u64>, String> {
-    let parsed = text.split_once("..").and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
-    let range = parsed.map(|(a, b): (u64, u64)| a..b).filter(|r| !r.is_empty());
-    range.ok_or_else(|| format!("no range `{text}`; write A..B with A < B, for example 0..10"))
+    match format!("gen:{text}").parse::<Split>() {
+        Ok(Split::Generated(seeds)) => Ok(seeds),
+        _ => {
+            let max = SeedRange::BUNDLED_TRAIN.first;
+            Err(format!("no range `{text}`; write A..B with A < B <= {max}, for example 0..10"))
+        }
+    }
 }
 
 #[cfg(test)]

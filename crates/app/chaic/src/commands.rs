@@ -52,7 +52,8 @@ use chaic_llm::language::{helper_names, partner_names};
 use comfy_table::{ContentArrangement, Table, presets};
 use serde::Serialize;
 
-use crate::output::OutputFormat;
+use crate::exit::ExitStatus;
+use crate::output::{OutputFormat, print_error};
 
 /// Returns the episode that an argument names: the file of this name if there is one, else the episode of this id.
 ///
@@ -117,6 +118,12 @@ fn write_json(path: Option<&Path>, report: &impl Serialize) -> Result<()> {
         write_atomically(path, json.as_bytes())?;
     }
     Ok(())
+}
+
+/// Reports that a command was stopped that has no partial result, and returns its end.
+fn stopped_without_result() -> ExitStatus {
+    print_error("stopped; nothing was written");
+    ExitStatus::Interrupted
 }
 
 /// Refuses JSON for a command that prints text only.

@@ -1,11 +1,15 @@
 //! Exit codes; `docs/reference/exit-codes.md` has the same table for users.
 
+use anyhow::anyhow;
 use chaic_env::EnvError;
 use chaic_episodes::SplitError;
 use chaic_eval::EvalError;
+use chaic_export::ExportError;
 use chaic_llm::error::LlmError;
+use chaic_study::StudyError;
 use chaic_subprocess::Refusal;
 use chaic_training::TrainingError;
+use chaic_vision::behavior::store::StoreError;
 
 /// Success.
 pub const OK: u8 = 0;
@@ -63,8 +67,58 @@ pub fn code_of(error: &anyhow::Error) -> u8 {
         || llm.is_some_and(LlmError::is_usage)
         || registry.is_some_and(|inner| inner.is::<Refusal>())
         || error.downcast_ref().is_some_and(EvalError::is_usage)
+        || error.downcast_ref().is_some_and(ExportError::is_usage)
+        || error.downcast_ref().is_some_and(StoreError::is_usage)
+        || error.downcast_ref().is_some_and(StudyError::is_usage)
         || error.downcast_ref().is_some_and(TrainingError::is_usage)
         || error.is::<Refusal>()
         || error.is::<SplitError>();
     if is_usage { USAGE } else { FAILED }
+}
+
+/// Adds a line to an error that says how to continue. An invalid request stays as it is: it would fail again.
+pub fn with_hint(error: anyhow::Error, hint: &str) -> anyhow::Error {
+    if code_of(&error) == USAGE { error } else { anyhow!("{error:#}\n{hint}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use super::*;
+
+    #[test]
+    fn invalid_requests_have_their_own_code_and_no_hint() {
+        let folder = || PathBuf::from("out");
+        let no_key = || LlmError::NoKey { variable: "KEY".to_owned() };
+        let not_named = LlmError::NotNamed {
+            path: folder(),
+            url: "http://h/v1".to_owned(),
+            key_env: String::new(),
+            is_key_named: true,
+        };
+        let (name, problem) = ("map.txt".to_owned(), "line 2".to_owned());
+        let cases: [(anyhow::Error, u8); 12] = [
+            (no_key().into(), USAGE),
+            (EnvError::Registry(no_key().into()).into(), USAGE),
+            (not_named.into(), USAGE),
+            (LlmError::Template { name, problem }.into(), USAGE),
+            (LlmError::Endpoint { problem: "no answer".to_owned() }.into(), FAILED),
+            (EvalError::Options("no".to_owned()).into(), USAGE),
+            (EvalError::NotEmpty { path: folder() }.into(), FAILED),
+            (ExportError::Size(33).into(), USAGE),
+            (ExportError::Rate { every: 7, frames_per_s: 30 }.into(), USAGE),
+            (ExportError::NotEmpty(folder()).into(), FAILED),
+            (StoreError::Config(folder()).into(), USAGE),
+            (StudyError::Code("..".to_owned()).into(), USAGE),
+        ];
+        for (error, code) in cases {
+            let text = error.to_string();
+            assert_eq!(code_of(&error), code, "{text}");
+            let error = with_hint(error, "the same command continues");
+            assert_eq!(code_of(&error), code, "{text}");
+            let has_hint = error.to_string().ends_with("\nthe same command continues");
+            assert_eq!(has_hint, code == FAILED, "{error}");
+        }
+    }
 }

@@ -20,8 +20,8 @@ mod tally;
 pub use accumulators::MetricAccumulator;
 pub use cluster::{Clusters, Environments, Interval};
 pub use differences::{
-    Difference, HelperResults, Resolution, differences, mean_rate, paired_difference, resolution,
-    run_differences,
+    Difference, HelperResults, MeanRate, Resolution, differences, mean_rate, paired_difference,
+    resolution, run_differences,
 };
 pub use formulas::{FormulaSet, Formulas, Spread};
 pub use result::{Delivery, RunResult, RunStatus, Summary};

@@ -32,7 +32,7 @@ pub use layout::{HEIGHT_PX, WIDTH_PX};
 pub struct ReplayOptions {
     /// Frames per second of the video.
     pub fps: u32,
-    /// Interval between drawn frames of the episode.
+    /// Interval between drawn frames of the episode. The first and the last frame are always drawn.
     pub every: u32,
 }
 
@@ -141,7 +141,7 @@ pub fn write(
     trace: &Trace,
     episode: &Episode,
     options: ReplayOptions,
-    mut masks: Option<&mut (dyn Masks + '_)>,
+    masks: Option<&mut (dyn Masks + '_)>,
     out: &Path,
     progress: &mut dyn FnMut(Frame) -> ControlFlow<()>,
 ) -> Result<Option<u32>> {
@@ -153,23 +153,41 @@ pub fn write(
     };
     let mut replay = Replay::new(trace, episode)?;
     let mut video = VideoWriter::create(out, WIDTH_PX, HEIGHT_PX, options.fps).map_err(convert)?;
-    let every = options.every.max(1);
-    loop {
-        let frame = replay.world().state().frame;
-        if progress(frame).is_break() {
-            return Ok(None);
-        }
-        let is_last = !replay.step()?;
-        if frame.is_multiple_of(every) || is_last {
-            video.push(&replay.render(masks.as_deref_mut())).map_err(convert)?;
-        }
-        if is_last {
-            break;
-        }
+    let mut sink = |image: &RgbImage| video.push(image).map_err(convert);
+    if draw_images(&mut replay, options.every, masks, progress, &mut sink)?.is_break() {
+        return Ok(None);
     }
     let n = video.n_frames();
     video.finish().map_err(convert)?;
     Ok(Some(n))
+}
+
+/// Passes the images of a video to `sink`: those of the first frame, of each `every`-th one and of
+/// the last one. Stops if `progress` breaks.
+fn draw_images(
+    replay: &mut Replay<'_>,
+    every: u32,
+    mut masks: Option<&mut (dyn Masks + '_)>,
+    progress: &mut dyn FnMut(Frame) -> ControlFlow<()>,
+    sink: &mut dyn FnMut(&RgbImage) -> Result<()>,
+) -> Result<ControlFlow<()>> {
+    loop {
+        let frame = replay.world().state().frame;
+        if progress(frame).is_break() {
+            return Ok(ControlFlow::Break(()));
+        }
+        // Drawn before the step, which advances to the next frame.
+        let is_drawn = frame.is_multiple_of(every.max(1));
+        if is_drawn {
+            sink(&replay.render(masks.as_deref_mut()))?;
+        }
+        if !replay.step()? {
+            if !is_drawn {
+                sink(&replay.render(masks))?;
+            }
+            return Ok(ControlFlow::Continue(()));
+        }
+    }
 }
 
 /// Renderer of a trace.

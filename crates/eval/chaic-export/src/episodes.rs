@@ -1,13 +1,13 @@
 //! Export of a split: one JSON file per episode, with a card and metadata.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use chaic_episodes::{Episode, Split};
 use chaic_files::{create_folders, write_atomically};
 
 use crate::card::{DataType, DatasetDescription, Field, FileGroup, Place, RecordSet, common};
 use crate::error::ExportError;
-use crate::folder;
+use crate::folder::{NewFolder, write_description};
 
 /// Folder of the episode files within the data set.
 const EPISODES: &str = "episodes";
@@ -18,10 +18,10 @@ pub fn file_name(id: &str) -> String {
     id.replace("/gen/", "-").replace('/', "-") + ".json"
 }
 
-/// Writer of a split.
+/// Writer of a split. A data set that is not finished is removed.
 #[derive(Debug)]
 pub struct EpisodeSetWriter {
-    folder: PathBuf,
+    folder: NewFolder,
     n: usize,
 }
 
@@ -31,9 +31,9 @@ impl EpisodeSetWriter {
     /// # Errors
     /// If the folder is not empty or cannot be created.
     pub fn create(path: &Path) -> Result<EpisodeSetWriter, ExportError> {
-        folder::create_empty(path)?;
+        let folder = NewFolder::create(path)?;
         create_folders(&path.join(EPISODES))?;
-        Ok(EpisodeSetWriter { folder: path.to_owned(), n: 0 })
+        Ok(EpisodeSetWriter { folder, n: 0 })
     }
 
     /// Writes an episode.
@@ -41,7 +41,7 @@ impl EpisodeSetWriter {
     /// # Errors
     /// If the file cannot be written.
     pub fn add(&mut self, episode: &Episode) -> Result<(), ExportError> {
-        let path = self.folder.join(EPISODES).join(file_name(episode.id()));
+        let path = self.folder.path().join(EPISODES).join(file_name(episode.id()));
         write_atomically(&path, episode.to_json().as_bytes())?;
         self.n += 1;
         Ok(())
@@ -52,7 +52,9 @@ impl EpisodeSetWriter {
     /// # Errors
     /// If a file cannot be written.
     pub fn finish(self, split: &Split) -> Result<usize, ExportError> {
-        folder::write_description(&self.folder, "chaic-episodes", &description(split, self.n))?;
+        let description = description(split, self.n);
+        write_description(self.folder.path(), "chaic-episodes", &description)?;
+        self.folder.finish();
         Ok(self.n)
     }
 }

@@ -48,3 +48,14 @@ pub enum ExportError {
     #[error("{0} has no {1}")]
     NoAgent(String, AgentId),
 }
+
+impl ExportError {
+    /// Returns whether the caller's request caused the error.
+    pub fn is_usage(&self) -> bool {
+        match self {
+            ExportError::Size(_) | ExportError::Rate { .. } | ExportError::NoAgent(..) => true,
+            ExportError::Env(error) => error.is_usage(),
+            _ => false,
+        }
+    }
+}

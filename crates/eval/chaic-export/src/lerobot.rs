@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 
 use crate::card::{DataType, DatasetDescription, Field, FileGroup, Place, RecordSet, common};
 use crate::error::ExportError;
-use crate::folder as dataset_folder;
+use crate::folder::{NewFolder, write_description};
 use crate::table::{self, Column};
 
 /// Frames per second of the export, as in replays. The world itself has no unit of seconds.
@@ -66,9 +66,24 @@ pub struct LeRobotOptions {
     pub image_size: u32,
 }
 
-/// Writer of a data set.
+impl LeRobotOptions {
+    /// Checks the options.
+    ///
+    /// # Errors
+    /// [`ExportError::Rate`] or [`ExportError::Size`].
+    pub fn check(&self) -> Result<(), ExportError> {
+        let LeRobotOptions { every, image_size, .. } = *self;
+        if every == 0 || !FRAMES_PER_S.is_multiple_of(every) {
+            return Err(ExportError::Rate { every, frames_per_s: FRAMES_PER_S });
+        }
+        // Videos have whole blocks of two by two pixels.
+        if image_size.is_multiple_of(2) { Ok(()) } else { Err(ExportError::Size(image_size)) }
+    }
+}
+
+/// Writer of a data set, which is removed if it is not finished.
 pub struct LeRobotWriter {
-    folder: PathBuf,
+    folder: NewFolder,
     options: LeRobotOptions,
     tasks: Vec<String>,
     episodes: Vec<EpisodeEntry>,
@@ -132,19 +147,11 @@ impl LeRobotWriter {
     /// Creates a data set in an empty folder.
     ///
     /// # Errors
-    /// If the folder is not empty or cannot be created, or the sampling interval is invalid.
+    /// If the folder is not empty or cannot be created, or the options are invalid.
     pub fn create(folder: &Path, options: LeRobotOptions) -> Result<LeRobotWriter, ExportError> {
-        if options.every == 0 || !FRAMES_PER_S.is_multiple_of(options.every) {
-            let every = options.every;
-            return Err(ExportError::Rate { every, frames_per_s: FRAMES_PER_S });
-        }
-        // Videos have whole blocks of two by two pixels.
-        if !options.image_size.is_multiple_of(2) {
-            return Err(ExportError::Size(options.image_size));
-        }
-        dataset_folder::create_empty(folder)?;
+        options.check()?;
         Ok(LeRobotWriter {
-            folder: folder.to_owned(),
+            folder: NewFolder::create(folder)?,
             options,
             tasks: Vec::new(),
             episodes: Vec::new(),
@@ -162,7 +169,7 @@ impl LeRobotWriter {
     /// Returns the path of an episode's file, and creates its folders.
     fn file(&self, kind: &str, episode: usize, extension: &str) -> Result<PathBuf, ExportError> {
         let (chunk, file) = (episode / CHUNK, episode % CHUNK);
-        let folder = self.folder.join(kind).join(format!("chunk-{chunk:03}"));
+        let folder = self.folder.path().join(kind).join(format!("chunk-{chunk:03}"));
         create_folders(&folder)?;
         Ok(folder.join(format!("file-{file:03}.{extension}")))
     }
@@ -289,7 +296,7 @@ impl LeRobotWriter {
     /// # Errors
     /// If a file cannot be written.
     pub fn finish(self) -> Result<usize, ExportError> {
-        let meta = self.folder.join("meta");
+        let meta = self.folder.path().join("meta");
         create_folders(&meta)?;
         // Readers use the names of tasks as the table's index.
         let pandas = json!({
@@ -315,8 +322,10 @@ impl LeRobotWriter {
             write_atomically(&meta.join(name), text.as_bytes())
         };
         json("stats.json", &self.stats())?;
+        write_description(self.folder.path(), "chaic-lerobot", &self.description())?;
+        // The last file: after a crash, a folder without it is no data set.
         json("info.json", &self.info())?;
-        dataset_folder::write_description(&self.folder, "chaic-lerobot", &self.description())?;
+        self.folder.finish();
         Ok(self.n_frames)
     }
 

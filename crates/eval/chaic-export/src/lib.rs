@@ -7,7 +7,9 @@
 //!
 //! **What it is not**: it plays no episodes other than traces, and trains no models.
 //!
-//! **Invariant**: after an interruption, the data set is complete for the episodes exported so far.
+//! **Invariants**
+//! - After an interruption, the data set is complete for the episodes exported so far.
+//! - After an error, nothing of the data set is left.
 
 pub mod card;
 pub mod croissant;

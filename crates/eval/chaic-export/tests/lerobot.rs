@@ -1,6 +1,6 @@
 //! A recorded episode is exported to Parquet tables with one row per sampled frame, and the rewards
 //! sum up to the transport rate. An interrupted export is a complete data set of fewer episodes.
-//! Invalid options are reported before any file is written.
+//! Invalid options are reported before any file is written. A failed export leaves no data set.
 
 use std::fs::{self, File};
 use std::path::Path;
@@ -109,6 +109,35 @@ fn an_episode_is_exported_as_a_table_and_a_video() {
 }
 
 #[test]
+fn a_failed_export_leaves_nothing_and_can_be_repeated() {
+    let episode = find_episode("moving_house/gen/40000001").unwrap();
+    let config = EpisodeConfig { image_size: Some(64), ..EpisodeConfig::new(&episode, "rhp") };
+    let helper = find(&BuiltInHelpers, "rhp", RuleSet::PAPER.planner).unwrap();
+    let header = Env::new(config, helper).unwrap().header().clone();
+    // The first frame alone.
+    let trace = Trace { header, records: Vec::new() };
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("set");
+    for is_new in [true, false] {
+        if !is_new {
+            fs::create_dir(&out).unwrap();
+        }
+        let mut writer = LeRobotWriter::create(&out, OPTIONS).unwrap();
+        assert!(writer.add(&trace, &episode, &mut || true).unwrap());
+        assert!(out.join("data").is_dir());
+        // A file in the place of the folder for metadata.
+        fs::write(out.join("meta"), "").unwrap();
+        assert!(matches!(writer.finish(), Err(ExportError::File(_))));
+        assert_eq!(out.exists(), !is_new, "an existing folder stays");
+    }
+    assert!(fs::read_dir(&out).unwrap().next().is_none());
+    let mut writer = LeRobotWriter::create(&out, OPTIONS).unwrap();
+    assert!(writer.add(&trace, &episode, &mut || true).unwrap());
+    assert_eq!(writer.finish().unwrap(), 1);
+    assert!(out.join("meta/info.json").exists());
+}
+
+#[test]
 fn invalid_options_are_reported_before_files_are_written() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("something"), "").unwrap();
@@ -117,6 +146,7 @@ fn invalid_options_are_reported_before_files_are_written() {
     let out = folder.path().join("set");
     let error = LeRobotWriter::create(&out, LeRobotOptions { every: 7, ..OPTIONS });
     assert!(matches!(error, Err(ExportError::Rate { every: 7, .. })));
+    assert!(error.is_err_and(|error| error.is_usage()));
     let error = LeRobotWriter::create(&out, LeRobotOptions { image_size: 33, ..OPTIONS });
     assert!(matches!(error, Err(ExportError::Size(33))));
     assert!(!out.exists());

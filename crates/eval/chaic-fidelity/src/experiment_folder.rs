@@ -117,7 +117,7 @@ impl ExperimentFolder {
             n_episodes: *n_episodes,
             seeds: Some(part.seeds),
             image_size: *image_size,
-            episodes: Some(self.episodes()?),
+            episodes: Some(self.episodes(part)?),
             rules: Some(part.rules),
             rule_overrides: part.switch.iter().map(|rule| format!("{rule}=paper")).collect(),
             no_traces: part.switch.is_some(),
@@ -135,9 +135,14 @@ impl ExperimentFolder {
         self.path.join(&part.name)
     }
 
-    /// Returns the episodes that the first run copied, so that all runs use the same; before it,
-    /// those of the option.
-    fn episodes(&self) -> Result<PathBuf> {
+    /// Returns the episodes of a part. A resumed run compares those of the option with its copies. A new
+    /// run has those that the first run copied, so that all runs use the same; before it, those of the option.
+    fn episodes(&self, part: &ExperimentPart) -> Result<PathBuf> {
+        if let Some(given) = &self.episodes
+            && RunFolder::is_run(&self.folder(part))
+        {
+            return Ok(given.clone());
+        }
         let mut runs = self.plan.parts().into_iter().map(|p| self.folder(&p));
         let copies = runs.find(|run| RunFolder::is_run(run)).map(|r| r.join("episodes"));
         copies.or_else(|| self.episodes.clone()).ok_or_else(|| {

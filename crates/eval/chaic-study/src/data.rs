@@ -136,6 +136,8 @@ pub struct ParticipantData {
     pub slot: u32,
     /// Records after the first one, each with the number of its line.
     pub records: Vec<(usize, DataRecord)>,
+    /// Number of an incomplete last line, which is left out: a write was interrupted, or goes on.
+    pub torn_line: Option<usize>,
 }
 
 impl ParticipantData {
@@ -147,7 +149,7 @@ impl ParticipantData {
         ParticipantData::parse(&read_user_file(path, MAX_BYTES + 1)?, path)
     }
 
-    /// Parses the content of a participant's file; `path` is for messages.
+    /// Parses the content of a participant's file; `path` is for messages. An incomplete last line is left out.
     ///
     /// # Errors
     /// [`StudyError::Data`] with the line and the problem.
@@ -160,7 +162,9 @@ impl ParticipantData {
         if bytes.len() as u64 > MAX_BYTES {
             return Err(wrong(1, format!("the file is longer than {MAX_BYTES} bytes")));
         }
-        let text = std::str::from_utf8(bytes).map_err(|e| wrong(1, format!("not UTF-8: {e}")))?;
+        let n_whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |k| k + 1);
+        let (whole, last) = bytes.split_at(n_whole);
+        let text = std::str::from_utf8(whole).map_err(|e| wrong(1, format!("not UTF-8: {e}")))?;
         let mut records = Vec::new();
         for (line, text) in (1..).zip(text.lines()) {
             if line > MAX_RECORDS {
@@ -169,6 +173,13 @@ impl ParticipantData {
             let record = DataRecord::parse(text).map_err(|problem| wrong(line, problem))?;
             records.push((line, record));
         }
+        // Only the end of a line may be missing, for example after an editor.
+        let last_line = records.len() + 1;
+        let last_record =
+            std::str::from_utf8(last).ok().and_then(|text| DataRecord::parse(text).ok());
+        let is_torn = !last.is_empty() && last_record.is_none();
+        let torn_line = is_torn.then_some(last_line);
+        records.extend(last_record.map(|record| (last_line, record)));
         let mut records = records.into_iter();
         match records.next() {
             Some((_, DataRecord::Start { format, version, study, code, slot, .. })) => {
@@ -179,7 +190,7 @@ impl ParticipantData {
                 if !is_code(&code) {
                     return Err(wrong(1, StudyError::Code(code).to_string()));
                 }
-                Ok(ParticipantData { study, code, slot, records: records.collect() })
+                Ok(ParticipantData { study, code, slot, records: records.collect(), torn_line })
             }
             _ => Err(wrong(1, format!("the first record must be `start` of `{FORMAT}`"))),
         }

@@ -43,5 +43,12 @@ pub enum StudyError {
     },
 }
 
+impl StudyError {
+    /// Returns whether the caller's request caused the error.
+    pub fn is_usage(&self) -> bool {
+        matches!(self, StudyError::Code(_))
+    }
+}
+
 /// Result of the functions of this crate.
 pub type Result<T> = std::result::Result<T, StudyError>;

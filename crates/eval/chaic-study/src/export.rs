@@ -35,7 +35,7 @@ pub struct ExportReport {
     pub traces: usize,
     /// Traces that agree with their re-simulation.
     pub verified: Vec<VerifiedTrial>,
-    /// Traces that differ, and other things to look at.
+    /// Traces that differ, incomplete last lines, and other things to look at.
     pub problems: Vec<String>,
     /// Slots without a complete participation: further participants can take them.
     pub open_slots: Vec<u32>,
@@ -52,7 +52,8 @@ pub struct VerifiedTrial {
 
 /// Exports files of participants, or folders with such files, to a new folder.
 ///
-/// A trace that differs from its re-simulation is exported and marked as not verified.
+/// A trace that differs from its re-simulation is exported and marked as not verified. An incomplete last line of a
+/// file is left out and reported.
 ///
 /// # Errors
 /// If a file is not that of a participant of this study, two files have the same code, or the folder is not
@@ -77,6 +78,7 @@ pub fn export(plan: &StudyPlan, paths: &[PathBuf], out: &Path) -> Result<ExportR
         return Err(StudyError::NotEmpty { path: out.to_owned() });
     }
     let mut report = ExportReport { participants: participations.len(), ..ExportReport::default() };
+    report.problems.extend(participations.iter().filter_map(Participation::torn_line_note));
     let mut tables = Tables::new(plan);
     for participation in &participations {
         participation.export(plan, out, &mut tables, &mut report)?;
@@ -127,6 +129,8 @@ struct Participation {
     /// By number of the trial.
     played: BTreeMap<usize, PlayedTrial>,
     answers: Vec<AnsweredForm>,
+    /// Number of an incomplete last line.
+    torn_line: Option<usize>,
 }
 
 /// A trial that has begun.
@@ -157,6 +161,7 @@ impl Participation {
             code: data.code,
             played: BTreeMap::new(),
             answers: Vec::new(),
+            torn_line: data.torn_line,
         };
         for (line, record) in data.records {
             check.add(plan, &record).map_err(|problem| wrong(line, problem))?;
@@ -164,6 +169,12 @@ impl Participation {
         }
         participation.is_complete = check.is_complete();
         Ok(participation)
+    }
+
+    /// Returns a note about an incomplete last line; `None` without one.
+    fn torn_line_note(&self) -> Option<String> {
+        let (path, line) = (self.path.display(), self.torn_line?);
+        Some(format!("{path}, line {line}: the line is incomplete and left out"))
     }
 
     /// Adds a checked record.

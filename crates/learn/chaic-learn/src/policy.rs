@@ -15,7 +15,7 @@ use chaic_core::{AgentError, AgentId, Briefing, Frame, Observation};
 use chaic_env::helper_registry::Helper;
 use chaic_nn::Pass;
 
-use crate::actor_critic::ActorCritic as _;
+use crate::actor_critic::{ActorCritic as _, ActorCriticOutput};
 use crate::candidate_scorer::CandidateSet;
 use crate::features::FeatureEncoder;
 use crate::plan_history::may_replace;
@@ -53,6 +53,14 @@ impl ActionSelection {
     /// 0.53 with the most probable plans had 0.50 at a temperature of 0.5. Always the most probable
     /// plan would let a policy repeat an attempt forever.
     pub const HELPER: ActionSelection = ActionSelection::Sample { temperature: 0.2 };
+
+    /// Selects an action; draws from `rng` if it samples.
+    pub(crate) fn select(self, output: &ActorCriticOutput, rng: &mut RngStream) -> usize {
+        match self {
+            ActionSelection::Sample { temperature } => output.sample_at(temperature, rng.unit()),
+            ActionSelection::Greedy => output.argmax(),
+        }
+    }
 }
 
 /// Recorded decision.
@@ -112,12 +120,7 @@ impl LearnedPolicy {
         let PolicyWeights { model, parameters, .. } = &*self.weights;
         let output =
             model.forward(parameters, std::iter::once(&observation), &mut self.pass).remove(0);
-        let action = match self.selection {
-            ActionSelection::Sample { temperature } => {
-                output.sample_at(temperature, self.rng.unit())
-            }
-            ActionSelection::Greedy => output.argmax(),
-        };
+        let action = self.selection.select(&output, &mut self.rng);
         let plan = candidates[action];
         self.features.record(plan, Some(action), frame);
         if let Some(log) = &self.log {

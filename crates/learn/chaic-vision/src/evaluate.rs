@@ -173,7 +173,7 @@ const SIZES: [(&str, AreaRange); 3] = [
 pub const MIN_FREQUENT_INSTANCES: usize = 50;
 
 /// Evaluates a detector on the first views. `map_view` maps each view, by index, and its detections
-/// to an additional value.
+/// to an additional value. Returns `None` if `stop` is set meanwhile.
 pub fn report<A: Send>(
     detector: &TrainedDetector,
     split: DatasetSplit,
@@ -181,7 +181,8 @@ pub fn report<A: Send>(
     n_views: usize,
     n_threads: usize,
     map_view: impl Fn(usize, &LabeledView, &[Instance]) -> A + Sync + Send,
-) -> (DetectionReport, Vec<A>) {
+    stop: &AtomicBool,
+) -> Option<(DetectionReport, Vec<A>)> {
     let evaluate_view = |k: usize, view: &LabeledView, detections: &[Instance]| {
         let image = compare(view, detections);
         let correct = calibration_samples(detections, &image).into_iter().map(|s| s.is_correct);
@@ -189,9 +190,7 @@ pub fn report<A: Send>(
         let scored: Vec<(f32, bool)> = scores.zip(correct).collect();
         (image, (scored, map_view(k, view, detections)))
     };
-    let never = AtomicBool::new(false);
-    let evaluated = map_views(detector, split, config, n_views, n_threads, &never, evaluate_view);
-    let evaluated = evaluated.expect("the flag is never set");
+    let evaluated = map_views(detector, split, config, n_views, n_threads, stop, evaluate_view)?;
     let (images, details): (Vec<EvaluatedImage>, Vec<_>) = evaluated.into_iter().unzip();
     let (scored, mapped): (Vec<_>, Vec<A>) = details.into_iter().unzip();
     let detections = average_precision(&images, &EVALUATED_AREAS);
@@ -215,5 +214,5 @@ pub fn report<A: Send>(
         noise_model: DetectorNoiseModel::measured(&images),
         classes: detections.classes.iter().map(|(label, c)| (name(*label), *c)).collect(),
     };
-    (report, mapped)
+    Some((report, mapped))
 }

@@ -259,8 +259,10 @@ fn invalid_images_give_no_detections() {
 fn the_bundled_detector_finds_most_objects() {
     let trained = TrainedDetector::built_in();
     let (split, config) = (DatasetSplit::Validation, ViewConfig::NATURAL);
-    let (found, _) = report(&trained, split, config, 8, 2, |_, _, _| ());
+    let evaluated = report(&trained, split, config, 8, 2, |_, _, _| (), &NEVER_STOP);
+    let (found, _) = evaluated.expect("it is not stopped");
     assert!(found.map50 > 0.5, "{}", found.map50);
+    assert!(report(&trained, split, config, 8, 2, |_, _, _| (), &AtomicBool::new(true)).is_none());
 }
 
 #[test]

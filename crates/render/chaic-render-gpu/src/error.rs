@@ -49,6 +49,15 @@ pub enum GpuError {
         /// Maximum number of instances.
         max: usize,
     },
+    /// A view has limits of sight, which this renderer cannot apply.
+    #[error(
+        "view {index} has limits of sight, which the GPU renderer cannot apply; \
+         render it with chaic_render::Scene"
+    )]
+    LimitedSight {
+        /// Index of the view.
+        index: usize,
+    },
     /// The views of a batch differ in size.
     #[error(
         "view {index} is {width}x{height} pixels, the first view is {first_width}x{first_height}; \

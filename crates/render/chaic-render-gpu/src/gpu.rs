@@ -109,7 +109,8 @@ impl Gpu {
         state: &State,
         postures: &[Posture],
     ) -> Result<WorldId, GpuError> {
-        let placed = self.place(scene, state, postures, PlacedWorld::default())?;
+        let mut placed = PlacedWorld::default();
+        self.place(scene, state, postures, &mut placed)?;
         let free = self.worlds.iter().position(Option::is_none);
         let index = free.unwrap_or_else(|| {
             self.worlds.push(None);
@@ -119,12 +120,14 @@ impl Gpu {
         Ok(WorldId(index as u32))
     }
 
-    /// Updates a world to its current state, or to another episode.
+    /// Updates a world to its current state, or to another episode. After an error, the world keeps
+    /// its state of the last successful update.
     pub fn update(&mut self, id: WorldId, scene: &Scene, world: &World) -> Result<(), GpuError> {
         self.update_state(id, scene, world.state(), &postures(world))
     }
 
-    /// Updates a world to a given state and the postures of its agents in order.
+    /// Updates a world to a given state and the postures of its agents in order. After an error,
+    /// the world keeps its state of the last successful update.
     pub fn update_state(
         &mut self,
         id: WorldId,
@@ -132,10 +135,10 @@ impl Gpu {
         state: &State,
         postures: &[Posture],
     ) -> Result<(), GpuError> {
-        let old = self.take_world(id)?;
-        let placed = self.place(scene, state, postures, old)?;
+        let mut placed = self.take_world(id)?;
+        let result = self.place(scene, state, postures, &mut placed);
         self.worlds[id.0 as usize] = Some(placed);
-        Ok(())
+        result
     }
 
     /// Removes a world from the device.
@@ -163,30 +166,26 @@ impl Gpu {
         self.lights.remove(old.light);
     }
 
-    /// Replaces a world. The old meshes are released last, so that shared ones stay on the device.
+    /// Replaces a world; does not change it after an error. The old meshes are released last, so
+    /// that shared ones stay on the device.
     fn place(
         &mut self,
         scene: &Scene,
         state: &State,
         postures: &[Posture],
-        old: PlacedWorld,
-    ) -> Result<PlacedWorld, GpuError> {
+        placed: &mut PlacedWorld,
+    ) -> Result<(), GpuError> {
         let mut new =
             PlacedWorld { regions: scene.portal_graph().clone(), ..PlacedWorld::default() };
-        let mut old = old;
-        let result = scene
-            .with_shapes(state, postures, |shapes| self.fill_world(shapes, &mut new, &mut old));
-        self.release(old);
-        match result {
-            Ok(()) => Ok(new),
-            Err(error) => {
-                self.release(new);
-                Err(error)
-            }
-        }
+        let result =
+            scene.with_shapes(state, postures, |shapes| self.fill_world(shapes, &mut new, placed));
+        let unused = if result.is_ok() { std::mem::replace(placed, new) } else { new };
+        self.release(unused);
+        result
     }
 
-    /// Fills a world, reusing unchanged parts of the old one.
+    /// Fills a world and moves unchanged parts of the old one into it. Parts are moved after all
+    /// steps that can fail, so an error leaves the old world complete.
     fn fill_world(
         &mut self,
         shapes: &Shapes,
@@ -198,10 +197,13 @@ impl Gpu {
             return Err(GpuError::TooManyInstances { n, max: MAX_INSTANCES });
         }
         let is_same_scene = Arc::ptr_eq(&new.regions, &old.regions);
-        let mut empty = Vec::new();
-        let reusable = if is_same_scene { &mut old.meshes } else { &mut empty };
-        self.fill_meshes(shapes, &mut new.meshes, reusable)?;
-        let mut records = new.meshes.iter().map(|mesh| mesh.record);
+        let reusable: &[PlacedMesh] = if is_same_scene { &old.meshes } else { &[] };
+        let keeps_meshes = !reusable.is_empty() && has_shapes_of(reusable, shapes);
+        if !keeps_meshes {
+            self.fill_meshes(shapes, &mut new.meshes, reusable)?;
+        }
+        let meshes = if keeps_meshes { &old.meshes } else { &new.meshes };
+        let mut records = meshes.iter().map(|mesh| mesh.record);
         let mut record_indices = Vec::with_capacity(shapes.len());
         for index in 0..shapes.len() {
             let Some(shape) = shapes.body(index) else {
@@ -225,6 +227,9 @@ impl Gpu {
         } else {
             new.light = self.lights.add(&self.context, &shapes.lighting())?;
         }
+        if keeps_meshes {
+            new.meshes = std::mem::take(&mut old.meshes);
+        }
         Ok(())
     }
 
@@ -234,15 +239,9 @@ impl Gpu {
         &mut self,
         shapes: &Shapes,
         new: &mut Vec<PlacedMesh>,
-        old: &mut Vec<PlacedMesh>,
+        old: &[PlacedMesh],
     ) -> Result<(), GpuError> {
-        let meshes = (0..shapes.len()).filter(|index| !shapes.is_body(*index));
-        let shape_ids = meshes.clone().map(|index| shapes.shape_id(index));
-        if !old.is_empty() && shape_ids.eq(old.iter().map(|mesh| mesh.shape_id)) {
-            std::mem::swap(new, old);
-            return Ok(());
-        }
-        for index in meshes {
+        for index in mesh_indices(shapes) {
             // Structure never changes.
             let reusable = old.get(index).filter(|_| shapes.is_structure(index));
             let reusable = reusable.map(|mesh| mesh.key);
@@ -253,6 +252,21 @@ impl Gpu {
     }
 }
 
+/// Returns the indices of all shapes except bodies.
+fn mesh_indices(shapes: &Shapes) -> impl Iterator<Item = usize> {
+    (0..shapes.len()).filter(move |index| !shapes.is_body(*index))
+}
+
+/// Returns whether the meshes are those of these shapes.
+fn has_shapes_of(meshes: &[PlacedMesh], shapes: &Shapes) -> bool {
+    mesh_indices(shapes)
+        .map(|index| shapes.shape_id(index))
+        .eq(meshes.iter().map(|mesh| mesh.shape_id))
+}
+
 fn postures(world: &World) -> Vec<Posture> {
     world.setup().agents().map(|agent| world.posture(agent)).collect()
 }
+
+#[cfg(test)]
+mod tests;

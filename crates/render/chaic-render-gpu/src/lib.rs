@@ -8,7 +8,7 @@
 //! **What it is not**: exact. Its images depend on the GPU and its driver; the images of
 //! [`chaic_render`] are the reference. No score, trace or digest may use this crate, so neither
 //! `chaic-eval` nor the command `chaic` depends on it. Its callers are training, data collection
-//! and visualization. It renders no plan views and reads no files.
+//! and visualization. It renders no plan views, applies no limits of sight and reads no files.
 //!
 //! **Invariants**
 //! - Geometry, levels of detail, cameras and the rule for which triangle a pixel belongs to are

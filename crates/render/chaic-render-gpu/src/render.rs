@@ -82,8 +82,8 @@ fn groups(max_triangles: &[u32], capacity: u64) -> Vec<ViewGroup> {
 
 impl Gpu {
     /// Renders a batch of views of one size. An invalid camera (see [`View`]) gets the same
-    /// background images as in the CPU renderer. Two things differ from the CPU renderer: a side
-    /// over [`MAX_SIDE_PX`] is an error, and [`View::sight`] is ignored.
+    /// background images as in the CPU renderer. Unlike in the CPU renderer, a side over
+    /// [`MAX_SIDE_PX`] is an error, and so is a view with [`View::sight`].
     pub fn render(&mut self, views: &[(WorldId, View)]) -> Result<Batch, GpuError> {
         let (width, height) = self.common_size_px(views)?;
         let channels: Vec<_> = views.iter().map(|(_, view)| view.channels).collect();
@@ -109,6 +109,10 @@ impl Gpu {
 
     fn common_size_px(&self, views: &[(WorldId, View)]) -> Result<(u32, u32), GpuError> {
         let Some((_, first)) = views.first() else { return Ok((0, 0)) };
+        // An unlimited image would show an agent more than it may see.
+        if let Some(index) = views.iter().position(|(_, view)| view.sight.is_some()) {
+            return Err(GpuError::LimitedSight { index });
+        }
         let (first_width, first_height) = (first.camera.width, first.camera.height);
         for (index, (world, view)) in views.iter().enumerate() {
             self.placed(*world)?;

@@ -14,7 +14,7 @@ use crate::shade::{OutputImages, shade};
 #[cfg(feature = "text")]
 use crate::text;
 use crate::text_label::{Align, TextLabel};
-use crate::view::with_scratch;
+use crate::view::{MAX_SIDE_PX, with_scratch};
 
 /// Height of the camera, meters: above every roof and tree.
 const EYE_M: f32 = 60.0;
@@ -27,9 +27,9 @@ const OBSTACLE: [u8; 3] = [120, 60, 200];
 /// Colors of partner, helper and child; further agents have the color of the child.
 const PEOPLE: [[u8; 3]; 3] = [[208, 64, 40], [16, 136, 140], [214, 160, 10]];
 
-/// Renders the map of a world, `width_px` wide (between 64 and [`crate::MAX_SIDE_PX`]), with a
-/// legend below. It shows room names, walls, target objects (rings), containers and obstacles, the
-/// goal place (frame), and the pose of each agent.
+/// Renders the map of a world, `width_px` wide (see [`FloorPlan::new`]), with a legend below. It
+/// shows room names, walls, target objects (rings), containers and obstacles, the goal place
+/// (frame), and the pose of each agent.
 #[cfg(feature = "text")]
 pub fn draw(world: &World, width_px: u32) -> RgbImage {
     draw_scene_plan(&Scene::new(world.setup()), world, width_px)
@@ -60,12 +60,14 @@ struct TintedRoom {
 }
 
 impl FloorPlan {
-    /// Prepares the map of a world, `width_px` wide (between 64 and [`crate::MAX_SIDE_PX`]).
+    /// Prepares the map of a world, `width_px` wide (between 64 and [`MAX_SIDE_PX`]). The map of a
+    /// world so deep that it would be higher than [`MAX_SIDE_PX`] is narrower.
     pub fn new(world: &World, width_px: u32) -> FloorPlan {
-        let width = width_px.clamp(64, crate::MAX_SIDE_PX);
+        let widest = (MAX_SIDE_PX as f32 / relative_height(world)) as u32;
+        let width = width_px.clamp(64, MAX_SIDE_PX).min(widest.max(1));
         let map = Map::new(world, width);
         let height = (map.area.size().y * map.px_per_m) as u32;
-        let height = height.clamp(1, crate::MAX_SIDE_PX);
+        let height = height.clamp(1, MAX_SIDE_PX);
         let rooms = tinted_rooms(world, &map, width, height);
         FloorPlan { width, height, rooms }
     }
@@ -316,8 +318,10 @@ fn mark_objects(image: &mut RgbImage, world: &World, map: &Map) {
     for (k, entity) in setup.entities().enumerate() {
         let Some(color) = marker_color(world, entity) else { continue };
         let size = setup.things[k].size_m();
+        // On a narrow map, the lower bound exceeds the upper one.
         let radius = (0.6 * size.x.max(size.z) * map.px_per_m)
-            .clamp(2.5 * stroke_px, 0.08 * image.width() as f32);
+            .min(0.08 * image.width() as f32)
+            .max(2.5 * stroke_px);
         let done = world.state().objects[k].delivered.is_some();
         circle(
             image,

@@ -3,6 +3,7 @@
 //! Agents do not receive them. The code is not optimized for speed.
 
 use chaic_core::EntityId;
+use chaic_core::geom::Camera;
 use chaic_world::World;
 
 use crate::Scene;
@@ -15,12 +16,13 @@ use crate::raster::{BACKGROUND, VisibilityId as _, unpack_visibility_id};
 use crate::scene_frame::SceneFrame;
 use crate::shader::Shader;
 use crate::view::{MAX_SIDE_PX, View, with_scratch};
+use crate::vision_limits::limit_vision;
 
 /// Labels of the pixels of a view, row-major, row 0 at the top.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Labels {
-    /// Depth along the camera axis, millimeters; 65535 for everything farther. Shape [height,
-    /// width].
+    /// Depth along the camera axis, millimeters; 65535 for everything farther, 0 outside the limits
+    /// of sight. Shape [height, width].
     pub depth_mm: Vec<u16>,
     /// Instance ids ([`EntityId`]). Shape [height, width].
     pub ids: Vec<u16>,
@@ -43,7 +45,8 @@ pub fn depth_mm(depth_m: f32) -> u16 {
 }
 
 impl Scene {
-    /// Labels a view of a world, independent of the channels of the view. An invalid camera
+    /// Labels a view of a world, independent of the channels of the view. Limits of sight apply as
+    /// to images: pixels outside of them have no depth, id, class or normal. An invalid camera
     /// ([`View`]) gets background labels.
     pub fn label(&self, world: &World, view: &View) -> Labels {
         let (width, height) = (view.camera.width, view.camera.height);
@@ -51,10 +54,9 @@ impl Scene {
             return Labels::default();
         }
         let n = width as usize * height as usize;
-        let mut labels = Labels {
-            depth_mm: vec![u16::MAX; n],
+        let mut surfaces = Surfaces {
+            depth_m: vec![Camera::FAR_M; n],
             ids: vec![EntityId::NOTHING.0; n],
-            classes: vec![Labels::NO_CLASS; n],
             normals: vec![0.0; 3 * n],
         };
         if let Some(projection) = Projection::from_camera(&view.camera).filter(|_| n > 0) {
@@ -62,21 +64,45 @@ impl Scene {
             let postures = world.setup().agents().map(|agent| world.posture(agent));
             let bodies: Vec<Body> = postures.map(|p| Body::new(&p, state.frame)).collect();
             let frame = self.frame(state, &bodies, false);
-            with_scratch(|scratch| label(&frame, &projection, view, scratch, &mut labels));
-            for (class, id) in labels.classes.iter_mut().zip(&labels.ids) {
-                *class = self.class_of(EntityId(*id)).map_or(Labels::NO_CLASS, |c| c.index() as u8);
+            with_scratch(|scratch| {
+                find_surfaces(&frame, &projection, view, scratch, &mut surfaces);
+            });
+        }
+        let Surfaces { mut depth_m, mut ids, mut normals } = surfaces;
+        if let Some(sight) = &view.sight {
+            limit_vision(sight, &view.camera, None, &mut depth_m, Some(&mut ids));
+            for (normal, id) in normals.as_chunks_mut::<3>().0.iter_mut().zip(&ids) {
+                if *id == EntityId::NOTHING.0 {
+                    *normal = [0.0; 3];
+                }
             }
         }
-        labels
+        let class_index = |id: &u16| {
+            self.class_of(EntityId(*id)).map_or(Labels::NO_CLASS, |class| class.index() as u8)
+        };
+        Labels {
+            depth_mm: depth_m.into_iter().map(depth_mm).collect(),
+            classes: ids.iter().map(class_index).collect(),
+            ids,
+            normals,
+        }
     }
 }
 
-fn label(
+/// Visible surfaces of a view; shapes as in [`Labels`].
+struct Surfaces {
+    depth_m: Vec<f32>,
+    ids: Vec<u16>,
+    normals: Vec<f32>,
+}
+
+/// Finds the surfaces of a view without limits of sight. Pixels of the background do not change.
+fn find_surfaces(
     frame: &SceneFrame,
     projection: &Projection,
     view: &View,
     scratch: &mut Scratch,
-    labels: &mut Labels,
+    surfaces: &mut Surfaces,
 ) {
     let Scratch { target, buffers, .. } = scratch;
     draw(frame, projection, view.exclusions(), target, buffers);
@@ -103,9 +129,9 @@ fn label(
             let depth_m = reciprocal(*inverse_depth);
             let normal = unit((row.base + row.at * depth_m).truncate());
             let pixel = j * projection.width + k;
-            labels.depth_mm[pixel] = depth_mm(clamp_depth_m(depth_m));
-            labels.ids[pixel] = instance.entity.0;
-            labels.normals[3 * pixel..][..3].copy_from_slice(&normal.to_array());
+            surfaces.depth_m[pixel] = clamp_depth_m(depth_m);
+            surfaces.ids[pixel] = instance.entity.0;
+            surfaces.normals[3 * pixel..][..3].copy_from_slice(&normal.to_array());
         }
     }
 }

@@ -7,6 +7,7 @@ pub use error::EpisodeError;
 
 use chaic_core::TaskId;
 use chaic_core::capability::PersonChange;
+use chaic_core::task::SceneKind;
 use chaic_world::Setup;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -46,6 +47,15 @@ impl GeneratorInfo {
     /// house, street or yard, so they are not independent samples.
     pub fn environment(&self) -> String {
         format!("{}/{}", self.name, self.place_seed)
+    }
+}
+
+/// Returns the name of the task's generator.
+pub(crate) fn generator_name(task: TaskId) -> &'static str {
+    match task.info().scene {
+        SceneKind::House => "house",
+        SceneKind::Street => "street",
+        SceneKind::Yard => "yard",
     }
 }
 
@@ -147,6 +157,13 @@ impl Episode {
             if let Some(problem) = find_name_problem(name) {
                 problems.push(crate::Problem { field: field.into(), problem });
             }
+        }
+        // The name becomes part of that of the environment, by which reports group episodes.
+        let expected = generator_name(file.setup.task);
+        if let Some(info) = file.generator.as_ref().filter(|info| info.name != expected) {
+            let found = error::truncated(&format!("{:?}", info.name));
+            let problem = format!("is {found}, expected {expected:?} for {}", file.setup.task);
+            problems.push(crate::Problem { field: "generator.name".into(), problem });
         }
         if problems.is_empty() {
             Ok(Episode { file })

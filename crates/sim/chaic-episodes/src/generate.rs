@@ -5,7 +5,7 @@ use chaic_core::task::SceneKind;
 use chaic_world::Setup;
 
 use crate::attempts::GenerateError;
-use crate::format::{Episode, GeneratorInfo};
+use crate::format::{Episode, GeneratorInfo, generator_name};
 use crate::seeds::GeneratorSeeds;
 use crate::{Settings, house, street, yard};
 
@@ -54,11 +54,11 @@ pub(crate) fn generator_info(
     seeds: GeneratorSeeds,
     settings: Settings,
 ) -> GeneratorInfo {
-    let (name, version) = match task.info().scene {
-        SceneKind::House => ("house", house::VERSION),
-        SceneKind::Street => ("street", street::VERSION),
-        SceneKind::Yard => ("yard", yard::VERSION),
+    let version = match task.info().scene {
+        SceneKind::House => house::VERSION,
+        SceneKind::Street => street::VERSION,
+        SceneKind::Yard => yard::VERSION,
     };
-    let (seed, place_seed) = (seeds.episode, seeds.place);
-    GeneratorInfo { name: name.to_owned(), version, seed, place_seed, settings }
+    let (name, seed, place_seed) = (generator_name(task).to_owned(), seeds.episode, seeds.place);
+    GeneratorInfo { name, version, seed, place_seed, settings }
 }

@@ -24,7 +24,7 @@ pub(crate) fn goal(source: &Source) -> Result<Goal, ImportError> {
             ImportError::field(&source.list_path, field, problem)
         })?;
         match targets.iter_mut().find(|(c, _)| *c == class) {
-            Some((_, n)) => *n += count,
+            Some((_, n)) => *n = n.saturating_add(*count),
             None => targets.push((class, *count)),
         }
     }

@@ -1,4 +1,5 @@
-//! The granted state: the memory knows what no image shows, and follows its changes.
+//! The granted state: the memory knows what no image shows, and follows its changes. The history: it
+//! contains all interactions of the agent itself.
 
 use super::*;
 use crate::decision::{Plan, valid_plans};
@@ -155,4 +156,18 @@ fn objects_in_the_own_hands_stay_there() {
     world.update();
     assert!(world.memory.hands.holds(apple) && !world.can_take(apple));
     assert!(world.memory.objects.get(apple).is_none());
+}
+
+#[test]
+fn the_history_contains_interactions_only() {
+    let (toy, apple, _) = rooms();
+    let mut world = Granted::new(toy, &[]);
+    let hand = chaic_core::Hand::Left;
+    let pick_up = Action::PickUp { object: apple, hand };
+    for action in [Action::MoveForward, pick_up, Action::PutIn, Action::Wait { frames: 5 }] {
+        world.memory.last = Some((action, Outcome::Success));
+        world.update();
+    }
+    let actions: Vec<Intent> = world.memory.history.iter().map(|record| record.action).collect();
+    assert_eq!(actions, [pick_up, Action::PutIn]);
 }

@@ -167,8 +167,8 @@ impl<'a> Simulation<'a> {
     fn run(mut self, operations: &[Operation], on_event: &mut dyn FnMut(SimulatedEvent)) -> f32 {
         let problem = self.problem;
         let mut helper = Person::new(&problem.helper, problem.helper_row());
-        let idle = Worker { is_blocked: true, ..problem.helper.clone() };
-        let partner_worker = problem.partner.as_ref().unwrap_or(&idle);
+        // Without a partner, its worker does nothing.
+        let partner_worker = problem.partner.as_ref().unwrap_or(&problem.helper);
         let mut partner = Person::new(partner_worker, problem.partner_row());
         partner.is_done = problem.partner.is_none();
         let mut next = 0;

@@ -1,15 +1,19 @@
-//! Promises: built-in agents act again as recorded, with each rule set; a person has no memory.
+//! Promises: built-in agents act again as recorded, with each rule set; so does an agent whose choice a joint
+//! lift replaced; a person has no memory.
 
-use chaic_core::AgentError;
+use chaic_core::memory_view::{ExploredCell, ExploredMap};
+use chaic_core::observation::{Grants, SensorConfig};
+use chaic_core::{AgentError, Briefing, ClassId, Hand, Observation, Vec2, Vec3};
 use chaic_episodes::find_episode;
+use chaic_world::Setup;
 
 use super::*;
 use crate::config::EpisodeConfig;
 use crate::env::Env;
-use crate::helper_registry::{BuiltInHelpers, built_in_partner};
-use crate::rules::RuleSet;
+use crate::helper_registry::{BuiltInHelpers, Helper, built_in_partner};
+use crate::rules::{PlannerRules, RuleSet};
 use crate::trace::Record;
-use crate::{EpisodeAgents, NoopAgent};
+use crate::{EpisodeAgents, NoopAgent, RunKey};
 
 /// Plays the first frames of an episode with images of 64 pixels.
 fn played(config: EpisodeConfig<'_>, agents: EpisodeAgents) -> Trace {
@@ -26,7 +30,15 @@ fn played(config: EpisodeConfig<'_>, agents: EpisodeAgents) -> Trace {
 
 /// Runs the agents again; returns the number of moments of each, and the agreement.
 fn rerun(trace: &Trace, episode: &Episode) -> Vec<(usize, RerunStatus)> {
-    let mut rerun = AgentRerun::new(trace, episode, &BuiltInHelpers).unwrap();
+    rerun_with(trace, episode, &BuiltInHelpers)
+}
+
+fn rerun_with(
+    trace: &Trace,
+    episode: &Episode,
+    helpers: &dyn HelperRegistry,
+) -> Vec<(usize, RerunStatus)> {
+    let mut rerun = AgentRerun::new(trace, episode, helpers).unwrap();
     let mut n_moments = vec![0; trace.header.people.len()];
     while let Some(moments) = rerun.step().unwrap() {
         for moment in moments {
@@ -55,11 +67,96 @@ fn agents_act_again_as_recorded() {
     }
 }
 
+/// Agent that takes one action after the other and repeats the last one.
+struct Scripted {
+    actions: Vec<Action>,
+    n_acts: usize,
+}
+
+impl Agent for Scripted {
+    fn sensors(&self) -> SensorConfig {
+        SensorConfig::NONE
+    }
+
+    fn reset(&mut self, _: &Briefing) {}
+
+    fn act(&mut self, _: &Observation) -> std::result::Result<Action, AgentError> {
+        let action = self.actions[self.n_acts.min(self.actions.len() - 1)];
+        self.n_acts += 1;
+        Ok(action)
+    }
+
+    fn memory_view(&self) -> Option<MemoryView> {
+        let cells = vec![ExploredCell::Unknown];
+        let map = ExploredMap { min: Vec2::ZERO, cell_m: 1.0, n_columns: 1, cells };
+        Some(MemoryView { map, objects: Vec::new(), people: Vec::new(), path: Vec::new() })
+    }
+}
+
+/// Registry of a scripted partner and a scripted helper.
+struct Scripts {
+    partner: Vec<Action>,
+    helper: Vec<Action>,
+}
+
+fn scripted(actions: &[Action]) -> Option<Helper> {
+    let agent = Box::new(Scripted { actions: actions.to_vec(), n_acts: 0 });
+    Some(Helper { agent, grants: Grants::IDS })
+}
+
+impl HelperRegistry for Scripts {
+    fn names(&self) -> Vec<String> {
+        vec!["script".to_owned()]
+    }
+
+    fn make(&self, _: &str, _: PlannerRules) -> Option<Helper> {
+        scripted(&self.helper)
+    }
+
+    fn partner(&self, _: &str, _: Option<&RunKey>, _: PlannerRules) -> Option<Helper> {
+        scripted(&self.partner)
+    }
+}
+
+#[test]
+fn an_agent_acts_again_after_a_joint_lift_replaced_its_choice() {
+    let id = "moving_house/train/01";
+    let mut setup = find_episode(id).unwrap().into_setup();
+    // The partner reaches the furniture, the helper does not.
+    setup.people[AgentId::HELPER.index()].pose.position = Vec3::new(9.0, 0.0, 1.0);
+    let furniture = |class: &str| {
+        let class = ClassId::named(class);
+        let k = setup.things.iter().position(|thing| thing.class == class).unwrap();
+        Target::Entity(Setup::entity(k))
+    };
+    let hand = Hand::Left;
+    let lift = Action::PickUp { object: furniture("wood_shelving"), hand };
+    let release = Action::PutOn { place: furniture("drawer"), hand };
+    // Both wait when the helper's attempt has failed. Then the partner calls it to the furniture.
+    let frames = RuleSet::COMPAT.world.durations.refused_pick_up;
+    let scripts = Scripts {
+        partner: vec![Action::Wait { frames }, lift, release, Action::TurnLeft],
+        helper: vec![lift, Action::Wait { frames: 7 }, Action::TurnRight],
+    };
+    let episode = Episode::new(id, "changed", None, setup).unwrap();
+    let rules = RuleSet::COMPAT;
+    let partner = Some("script");
+    let config = EpisodeConfig { rules, partner, ..EpisodeConfig::new(&episode, "script") };
+    let [made, made_partner] = [&scripts.helper, &scripts.partner].map(|script| scripted(script));
+    let trace = played(config, EpisodeAgents::new(made, made_partner));
+    let of_helper = trace.decisions().filter(|decision| decision.agent == AgentId::HELPER);
+    let actions: Vec<_> = of_helper.map(|decision| decision.action).collect();
+    assert_eq!(actions[1], Action::TurnRight, "the second choice was replaced");
+    for (n, status) in rerun_with(&trace, &episode, &scripts) {
+        assert!(n > 3 && status == RerunStatus::Equal, "{n} {status:?}");
+    }
+}
+
 #[test]
 fn a_person_and_an_unknown_helper_have_no_memory() {
     let episode = find_episode("no_constraint/test/00").unwrap();
     let config = EpisodeConfig::new(&episode, "mine");
-    let slot = AgentSlot::with_agent(Box::new(NoopAgent), chaic_core::observation::Grants::NONE);
+    let slot = AgentSlot::with_agent(Box::new(NoopAgent), Grants::NONE);
     let agents = EpisodeAgents { helper: Some(slot), partner: None };
     let mut trace = played(config, agents);
     let statuses = rerun(&trace, &episode);

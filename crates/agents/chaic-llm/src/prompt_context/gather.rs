@@ -102,6 +102,13 @@ pub(super) fn keep_nearest(plans: &[Plan], max_per_kind: usize) -> Vec<Plan> {
     kept
 }
 
+/// Keeps the last entries of a list; returns them and the number of omitted ones.
+pub(super) fn keep_last<T>(mut list: Vec<T>, limit: usize) -> (Vec<T>, usize) {
+    let n_omitted = list.len().saturating_sub(limit);
+    list.drain(..n_omitted);
+    (list, n_omitted)
+}
+
 pub(super) fn meters(x: f32) -> String {
     let text = format!("{x:.1}");
     if text == "-0.0" { "0.0".to_owned() } else { text }
@@ -187,14 +194,14 @@ fn self_facts(context: &Context<'_>, last_plan: Option<Plan>, length: Length) ->
             interaction(memory, record.frame, record.action, Some(record.outcome), put)
         })
         .collect();
-    let n_omitted = interactions.len().saturating_sub(length.interactions);
+    let (history, n_omitted_interactions) = keep_last(interactions, length.interactions);
     SelfFacts {
         x: meters(here.x),
         z: meters(here.y),
         hands: hands.held().map(describe_held).collect(),
         free_hands: usable.filter(|h| hands.hands[h.index()].is_none()).count(),
-        history: interactions[n_omitted..].to_vec(),
-        n_omitted_interactions: n_omitted,
+        history,
+        n_omitted_interactions,
         plan: last_plan.map(|p| plan_text(&p)),
     }
 }
@@ -227,7 +234,9 @@ fn interaction(
 fn other_agents(context: &Context<'_>, length: Length) -> Vec<PersonFacts> {
     let Context { briefing, memory, behavior, .. } = *context;
     let partner = briefing.companion(CompanionRole::Partner);
-    let guardian = partner.and_then(|p| memory.people.get(p));
+    // A partner is the guardian itself.
+    let guardian =
+        partner.filter(|_| briefing.me != AgentId::PARTNER).and_then(|p| memory.people.get(p));
     let other = |companion: &chaic_core::briefing::Companion| {
         let name = match (companion.role, briefing.me) {
             (CompanionRole::Child, _) => "the child",
@@ -246,10 +255,13 @@ fn other_agents(context: &Context<'_>, length: Length) -> Vec<PersonFacts> {
         let apart_m = pair
             .map(|(c, g)| horizontal_distance(c.position_in_world, g.position_in_world))
             .filter(|m| *m > AWAY_M);
-        let names = |list: &[(TrackId, ClassId)]| -> Vec<String> {
-            let skip = list.len().saturating_sub(2 * length.interactions);
-            list[skip..].iter().map(|(e, c)| named(*e, Some(*c))).collect()
+        let names = |list: &[(TrackId, ClassId)]| -> (Vec<String>, usize) {
+            let listed = list.iter().filter(|_| is_partner);
+            let names = listed.map(|(track, class)| named(*track, Some(*class))).collect();
+            keep_last(names, 2 * length.interactions)
         };
+        let (picked_up, n_omitted_picked_up) = names(&behavior.partner_taken);
+        let (holds, n_omitted_held) = names(&behavior.partner_holds);
         let is_listed_pick_up = |seen: &&ObservedInteraction| {
             matches!(seen.action, Action::PickUp { object, .. } if seen.outcome == Some(Outcome::Success)
                 && behavior.partner_taken.iter().any(|(e, _)| *e == object))
@@ -261,7 +273,7 @@ fn other_agents(context: &Context<'_>, length: Length) -> Vec<PersonFacts> {
             .filter(|a| !(is_partner && is_listed_pick_up(a)))
             .map(|a| interaction(memory, a.frame, a.action, a.outcome, None))
             .collect();
-        let n_omitted = actions.len().saturating_sub(length.interactions);
+        let (actions, n_omitted_interactions) = keep_last(actions, length.interactions);
         let at = seen.map(|p| to_xz(p.position_in_world)).unwrap_or_default();
         PersonFacts {
             name,
@@ -272,10 +284,12 @@ fn other_agents(context: &Context<'_>, length: Length) -> Vec<PersonFacts> {
             z: meters(at.y),
             distance_m: meters(at.distance(memory.position())),
             m_from_partner: apart_m.map(meters),
-            picked_up: if is_partner { names(&behavior.partner_taken) } else { Vec::new() },
-            holds: if is_partner { names(&behavior.partner_holds) } else { Vec::new() },
-            actions: actions[n_omitted..].to_vec(),
-            n_omitted_interactions: n_omitted,
+            picked_up,
+            n_omitted_picked_up,
+            holds,
+            n_omitted_held,
+            actions,
+            n_omitted_interactions,
         }
     };
     briefing.companions.iter().map(other).collect()

@@ -10,9 +10,9 @@ use super::{
 use crate::prompt_track::PromptTrack;
 
 impl PromptContext {
-    /// Samples of each track, with all variables filled and with all empty.
+    /// Samples of each track, with all variables of the track filled and with all empty.
     pub(crate) fn samples() -> Vec<PromptContext> {
-        let full = |track| PromptContext {
+        let full = |track: PromptTrack| PromptContext {
             track,
             goal_place: "bed".to_owned(),
             targets: vec!["apple".to_owned(), "bread".to_owned()],
@@ -26,13 +26,16 @@ impl PromptContext {
             horizon: 3000,
             frames_per_10_m: 210,
             me: body(&Persona::Child.capability()),
-            disclosed: Some(DisclosedFacts {
+            disclosed: (track == PromptTrack::KnownTask).then(|| DisclosedFacts {
                 task: "shopping",
                 partner: person(Persona::Rider.into()),
                 reach: reach(&Persona::Wheelchair.capability()),
                 strength_kg: 100,
             }),
-            wanted: vec![Count { name: "apple".to_owned(), count: 2 }],
+            wanted: match track {
+                PromptTrack::Partner => vec![Count { name: "apple".to_owned(), count: 2 }],
+                PromptTrack::Hidden | PromptTrack::KnownTask => Vec::new(),
+            },
             own: SelfFacts {
                 x: meters(1.0),
                 z: meters(-2.0),
@@ -56,7 +59,9 @@ impl PromptContext {
                 distance_m: meters(5.0),
                 m_from_partner: Some(meters(6.0)),
                 picked_up: vec!["apple #32".to_owned()],
+                n_omitted_picked_up: 7,
                 holds: vec!["apple #32".to_owned()],
+                n_omitted_held: 6,
                 actions: vec![Interaction {
                     frame: 20,
                     action: "pick up bread #40".to_owned(),

@@ -1,11 +1,22 @@
 //! Promise: prompts are complete, reveal nothing hidden, and are short enough.
 
-use chaic_core::TaskId;
+use std::sync::{Arc, Mutex};
+
+use chaic_agents::decision::{Context, Plan, Policy};
+use chaic_agents::perception_factory::GroundTruthPerceptionFactory;
+use chaic_agents::{PlannerRules, PlanningAgent, partner_grants};
+use chaic_core::observation::Grants;
+use chaic_core::{AgentError, Briefing, TaskId};
+use chaic_env::helper_registry::{Helper, built_in};
+use chaic_env::{Env, EpisodeAgents, EpisodeConfig};
+use chaic_episodes::find_episode;
 use chaic_llm::LanguageHelpers;
+use chaic_llm::prompt_context::{LENGTHS, PersonFacts, PromptContext};
+use chaic_llm::prompt_track::PromptTrack;
 use chaic_llm::tokens;
 use chaic_llm_standin::Options;
 
-use crate::common::{Fixture, decided, exchanges, flag, standin};
+use crate::common::{Fixture, SIZE, decided, exchanges, flag, standin};
 
 /// Maximum tokens of a prompt.
 const LIMIT: usize = 4000;
@@ -103,4 +114,41 @@ fn prompts_of_the_hidden_track_name_neither_task_nor_constraint_nor_goal() {
 fn goal_place(prompt: &str) -> &str {
     let (_, text) = prompt.split_once("goal place, which is: ").expect("it is named");
     text.split('.').next().expect("a sentence ends")
+}
+
+/// Partner that waits, and collects what its prompts would contain.
+struct ContextCollector {
+    contexts: Arc<Mutex<Vec<PromptContext>>>,
+}
+
+impl Policy for ContextCollector {
+    fn reset(&mut self, _: &Briefing) {}
+
+    fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
+        let (facts, _) =
+            PromptContext::new(PromptTrack::Partner, context, valid, None, 0, LENGTHS[0]);
+        self.contexts.lock().unwrap().push(facts);
+        Ok(Plan::Wait)
+    }
+}
+
+#[test]
+fn a_childs_distance_from_the_helper_is_not_called_that_from_its_guardian() {
+    let rules = PlannerRules::paper();
+    let contexts = Arc::new(Mutex::new(Vec::new()));
+    let policy = ContextCollector { contexts: Arc::clone(&contexts) };
+    // With all positions, the partner always knows where child and helper are.
+    let grants = Grants { positions: true, ..partner_grants(rules) };
+    let partner = Helper { agent: Box::new(PlanningAgent::new(policy, rules)), grants };
+    let helper = built_in("rhp", rules, &GroundTruthPerceptionFactory);
+    let episode = find_episode("shopping/test/00").unwrap();
+    let config = EpisodeConfig { image_size: Some(SIZE), ..EpisodeConfig::new(&episode, "rhp") };
+    let mut env = Env::new(config, EpisodeAgents::new(helper, Some(partner))).unwrap();
+    env.advance(Some(1000)).unwrap();
+    let contexts = contexts.lock().unwrap();
+    let people: Vec<&PersonFacts> = contexts.iter().flat_map(|facts| &facts.others).collect();
+    let is_far = |p: &&PersonFacts| p.distance_m.parse::<f32>().is_ok_and(|m| m > 4.0);
+    assert!(people.iter().any(|p| p.name == "your helper" && is_far(p)), "it walks away");
+    assert!(people.iter().any(|p| p.name == "the child" && !is_far(p)), "it stays");
+    assert!(people.iter().all(|p| p.m_from_partner.is_none()));
 }

@@ -186,9 +186,35 @@ fn two_steps_and_refused_schemas_work() {
     assert_eq!(server.stats().with_schema, 1, "it is tried once in an episode");
     assert!(!summary(&results[0]).counts.contains_key("helper.fallback_fault"));
     settings.request.answer_format = AnswerForm::Schema;
-    let language = LanguageHelpers::live(settings, flag()).unwrap();
+    let language = LanguageHelpers::live(settings.clone(), flag()).unwrap();
     assert!(!fixture.play("schema_only", &request, &language).0);
     assert!(language.problem().unwrap().contains("request.answer_format"));
+    let (_other, accepting) = standin(Options::default());
+    settings.endpoint.url = accepting.endpoint.url;
+    let language = LanguageHelpers::live(settings, flag()).unwrap();
+    let (is_complete, results) = fixture.play("schema_only", &request, &language);
+    assert!(is_complete, "another endpoint continues the run: {:?}", language.problem());
+    assert!(summary(&results[0]).counts["helper.decided_by_model"] > 0);
+}
+
+#[test]
+fn blank_reasoning_is_not_sent_as_an_empty_message() {
+    let fixture = Fixture::new(&[TaskId::NoConstraint], 100);
+    let answer = |question: &chaic_llm_standin::script::Question| {
+        if question.last.contains("step by step") { " ".to_owned() } else { question.answer() }
+    };
+    let response_mode = ResponseMode::Function(Box::new(answer));
+    let (_standin, mut settings) = standin(Options { response_mode, ..Options::default() });
+    settings.request.steps = PromptSteps::Two;
+    let language = LanguageHelpers::live(settings, flag()).unwrap();
+    assert!(fixture.play("run", &fixture.request(&["llm"]), &language).0);
+    let records = fixture.records("run");
+    let choices = exchanges(&records[0]).into_iter();
+    let choices: Vec<_> = choices.filter(|e| e.request.purpose == Purpose::Choose).collect();
+    assert!(!choices.is_empty());
+    for exchange in choices {
+        assert_eq!(exchange.request.messages[1].text, "(nothing)");
+    }
 }
 
 #[test]
@@ -214,6 +240,23 @@ fn an_invalid_answer_is_requested_once_more_with_the_reason() {
         let record = &fixture.records(&name)[0];
         assert_eq!(decided(record)[0].plan, plan);
     }
+}
+
+#[test]
+fn an_answer_that_was_cut_off_is_requested_again() {
+    let fixture = Fixture::new(&[TaskId::NoConstraint], 150);
+    let answer = |_: &chaic_llm_standin::script::Question| {
+        "{\"reasoning\": \"Plan 1 would be bad beca".to_owned()
+    };
+    let response_mode = ResponseMode::Function(Box::new(answer));
+    let options = Options { response_mode, finish_reason: "length", ..Options::default() };
+    let (standin, settings) = standin(options);
+    let language = LanguageHelpers::live(settings, flag()).unwrap();
+    let (is_complete, results) = fixture.play("run", &fixture.request(&["llm"]), &language);
+    assert!(is_complete);
+    let counts = &summary(&results[0]).counts;
+    assert_eq!(counts["helper.fallback_invalid"], counts["helper.decisions"]);
+    assert!(standin.stats().last_text.contains("can't be used: it is cut off"));
 }
 
 #[test]

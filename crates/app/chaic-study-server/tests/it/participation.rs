@@ -6,7 +6,7 @@ use std::fs;
 use chaic_files::faults::{FaultKind, FaultPlan, install};
 use chaic_study::export::export;
 
-use crate::kit::{DEFINITION, Folder, lines};
+use crate::kit::{DEFINITION, Folder, SIMULATED, lines};
 
 #[test]
 fn a_participation_is_stored_as_sent_and_exported() {
@@ -65,6 +65,30 @@ fn repeated_requests_change_nothing() {
     assert_eq!(other.status, 422);
     assert_eq!(other.error(), "record 2: another record is stored");
     assert_eq!(client.append(6, &lines[5..]).stored(), 8);
+}
+
+/// In a study that the server simulates, the page has another digest in its first record than the file.
+#[test]
+fn the_first_record_can_be_sent_again() {
+    for definition in [DEFINITION, SIMULATED] {
+        let folder = Folder::new(definition);
+        let server = folder.server();
+        let client = server.client(1);
+        let entered = client.enter().body;
+        let start =
+            entered.strip_prefix("{\"start\":").and_then(|rest| rest.split_once(",\"stored"));
+        let start = format!("{}\n", start.expect("the record of the page").0);
+        let begun = [start.clone(), "{\"type\":\"trial\",\"trial\":0}\n".to_owned()];
+        let text = folder.text(&client.code);
+        assert_eq!(client.append(0, &begun[..1]).stored(), 1);
+        assert_eq!(client.append(0, &begun).stored(), 2);
+        assert_eq!(client.append(0, &begun).stored(), 2);
+        let other = start.replace("\"slot\":1", "\"slot\":2");
+        let refused = client.append(0, &[other]);
+        assert_eq!(refused.status, 422);
+        assert_eq!(refused.error(), "record 0: another record is stored");
+        assert_eq!(folder.text(&client.code), text + &begun[1]);
+    }
 }
 
 #[test]

@@ -9,7 +9,7 @@ use super::{Tasks, ranges, tasks};
 /// `chaic fidelity`.
 #[derive(Args, Debug)]
 pub struct FidelityArguments {
-    /// Folder of episode files (*.json), for example from `chaic import original`.
+    /// Folder of episode files (*.json), for example from `chaic import original`; with --resume, of the same episodes.
     #[arg(long, value_name = "DIR")]
     pub episodes: Option<PathBuf>,
     /// Folder of all runs, for example runs/fidelity: `paper`, `compat` and `switch/RULE`, each written as by

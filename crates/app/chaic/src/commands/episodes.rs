@@ -3,11 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result};
 use chaic_core::TaskId;
 use chaic_episodes::{Episode, EpisodeError, Split, episodes, find_episode, json_schema};
-use chaic_eval::frame_export;
-use chaic_eval::read_episode_file;
+use chaic_eval::{EvalError, frame_export, read_episode_file};
 use chaic_export::episodes::file_name;
 use chaic_files::{create_folders, write_atomically};
 use comfy_table::Table;
@@ -17,7 +16,9 @@ use super::{bars, sealed, table};
 use crate::arguments::EpisodesCommand;
 use crate::exit::ExitStatus;
 use crate::interrupt;
-use crate::output::{OutputFormat, counted, print, print_error, print_result, print_while_read};
+use crate::output::{
+    OutputFormat, counted, print, print_error, print_result, print_warning, print_while_read,
+};
 
 /// Lists, shows, generates or validates episodes.
 pub fn run(command: &EpisodesCommand, format: OutputFormat) -> Result<ExitStatus> {
@@ -53,6 +54,9 @@ const ROWS: usize = 96;
 
 /// Prints while it reads: a split may have more episodes than memory holds.
 fn list(split: &Split, tasks: &[TaskId], format: OutputFormat) -> Result<ExitStatus> {
+    for task in tasks.iter().filter(|task| split.len_of(**task) == 0) {
+        print_warning(&format!("{split} has no episodes of {task}, which is not the paper's"));
+    }
     let mut listed = tasks.iter().flat_map(|task| episodes(split, *task));
     if format != OutputFormat::Json {
         loop {
@@ -121,7 +125,9 @@ fn show(argument: &str, out: &Path, width_px: u32, format: OutputFormat) -> Resu
 fn generate(task: TaskId, split: &Split, out: &Path, format: OutputFormat) -> Result<ExitStatus> {
     let n = split.len_of(task);
     if n == 0 {
-        bail!("{split} has no episodes of {task}, which is not the paper's; give --seeds");
+        let text =
+            format!("{split} has no episodes of {task}, which is not the paper's; give --seeds");
+        return Err(EvalError::Options(text).into());
     }
     create_folders(out)?;
     let stop = interrupt::stop_flag()?;

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Instant;
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use chaic_env::helper_registry::NONE;
 use chaic_env::partner_suite::{MAX_FILE_BYTES, PartnerSuite, SUITE, SuitePartner};
 use chaic_eval::EvalError;
@@ -129,10 +129,9 @@ fn start_runs(
 /// Returns the folder of runs that are resumed.
 fn resumed(path: &Path, given: Option<&PartnerSuite>) -> Result<SuiteFolder> {
     if RunFolder::is_run(path) {
-        bail!(
-            "{} is a run with one partner; omit --partners to resume it, or choose another --out",
-            path.display()
-        );
+        let text =
+            "is a run with one partner; omit --partners to resume it, or choose another --out";
+        return Err(EvalError::Options(format!("{} {text}", path.display())).into());
     }
     if !SuiteFolder::is_suite(path) {
         RunFolder::check_started(path)?;

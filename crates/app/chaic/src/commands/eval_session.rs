@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use anyhow::{Context as _, Result, anyhow, bail};
+use anyhow::{Context as _, Result, bail};
 use chaic_env::helper_registry::{BuiltInWithPerception, HelperRegistry};
 use chaic_env::recording::RecordedPartners;
 use chaic_eval::report::write_files;
@@ -19,6 +19,7 @@ use super::given_partners::GivenPartners;
 use super::summary::report_of;
 use super::{bars::RunBars, jobs, llm, run_perception, start_threads};
 use crate::arguments::{EvalArguments, ExecArguments, HelperArgument};
+use crate::exit::with_hint;
 use crate::interrupt;
 use crate::output::{counted, print_error, print_progress, print_warning, quoted, quoted_path};
 
@@ -95,7 +96,7 @@ impl<'a> Session<'a> {
             bars.clear();
             let folder = part.and(path.parent()).unwrap_or(path);
             let resume = how_to_resume(folder, arguments, &self.partner_options);
-            let is_complete = played.map_err(|e| anyhow!("{e:#}\n{resume}"))?;
+            let is_complete = played.map_err(|error| with_hint(error.into(), &resume))?;
             if let Some(problem) = language.and_then(LanguageHelpers::problem) {
                 bail!("paused: {problem}\n{resume}");
             }
@@ -176,15 +177,17 @@ pub(super) fn warn_of_run(run: &Run, warnings: &[impl std::fmt::Display]) {
     }
 }
 
-/// Returns the helper processes, each in its sandbox. The folder of the run is hidden from them.
+/// Returns the helper processes, each in its sandbox. The folders of the run and of `--episodes` are hidden from them.
 fn confined(
     arguments: &EvalArguments,
     run: &Path,
     launcher: &Launcher,
 ) -> Result<Vec<HelperProgram>> {
     let mut commands = arguments.commands();
+    let masked: Vec<PathBuf> =
+        [run.to_owned()].into_iter().chain(arguments.episodes.clone()).collect();
     for command in &mut commands {
-        arguments.exec.confine(command, launcher, &[run.to_owned()])?;
+        arguments.exec.confine(command, launcher, &masked)?;
     }
     Ok(commands)
 }

@@ -12,8 +12,8 @@ use chaic_export::episodes::EpisodeSetWriter;
 use chaic_export::lerobot::{LeRobotOptions, LeRobotWriter};
 use serde_json::json;
 
-use super::bars;
 use super::recorded::RecordedHelpers;
+use super::{bars, stopped_without_result};
 use crate::arguments::{EpisodesArguments, ExportCommand, LeRobotArguments};
 use crate::exit::ExitStatus;
 use crate::interrupt;
@@ -31,7 +31,8 @@ fn export_episodes(arguments: &EpisodesArguments, format: OutputFormat) -> Resul
     let EpisodesArguments { split, task, out } = arguments;
     let total: u64 = task.0.iter().map(|task| split.len_of(*task) as u64).sum();
     if total == 0 {
-        bail!("{split} has no episodes of these tasks, which are not the paper's; choose gen:A..B");
+        let text = "has no episodes of these tasks, which are not the paper's; choose gen:A..B";
+        return Err(EvalError::Options(format!("{split} {text}")).into());
     }
     let stop = interrupt::stop_flag()?;
     let mut writer = EpisodeSetWriter::create(out)?;
@@ -58,6 +59,8 @@ fn export_episodes(arguments: &EpisodesArguments, format: OutputFormat) -> Resul
 
 fn lerobot(arguments: &LeRobotArguments, format: OutputFormat) -> Result<ExitStatus> {
     let LeRobotArguments { run, out, agent, every, size, .. } = arguments;
+    let options_of_set = LeRobotOptions { agent: *agent, every: *every, image_size: *size };
+    options_of_set.check()?;
     let (folder, options) = RunFolder::read(run)?;
     if !options.traces {
         return Err(EvalError::NoTraces { path: folder.path().to_owned() }.into());
@@ -67,7 +70,6 @@ fn lerobot(arguments: &LeRobotArguments, format: OutputFormat) -> Result<ExitSta
         bail!("{} has no such episodes", folder.path().display());
     }
     let stop = interrupt::stop_flag()?;
-    let options_of_set = LeRobotOptions { agent: *agent, every: *every, image_size: *size };
     let mut writer = LeRobotWriter::create(out, options_of_set)?;
     let bar = bars::count_bar(traces.len() as u64, "episodes");
     let mut n = 0;
@@ -82,6 +84,9 @@ fn lerobot(arguments: &LeRobotArguments, format: OutputFormat) -> Result<ExitSta
         bar.set_position(n);
     }
     bar.finish_and_clear();
+    if n == 0 {
+        return Ok(stopped_without_result());
+    }
     let n_samples = writer.finish()?;
     let episodes = counted(n as usize, "episode");
     let text = format!("{}: {episodes}, {}\n", quoted_path(out), counted(n_samples, "sample"));

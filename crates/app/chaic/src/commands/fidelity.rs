@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use anyhow::{Result, anyhow};
+use anyhow::Result;
 use chaic_env::helper_registry::BuiltInHelpers;
 use chaic_env::rules::differing_rules;
 use chaic_eval::report::write_files;
@@ -21,7 +21,7 @@ use super::eval_session::{hide_worker_panics, warn_of_run};
 use super::summary::report_of;
 use super::{jobs, start_threads};
 use crate::arguments::FidelityArguments;
-use crate::exit::ExitStatus;
+use crate::exit::{ExitStatus, with_hint};
 use crate::interrupt;
 use crate::output::{
     OutputFormat, print_error, print_progress, print_result, print_warning, quoted_path,
@@ -45,7 +45,7 @@ pub fn run(arguments: &FidelityArguments, format: OutputFormat) -> Result<ExitSt
         let parts = requested_parts(&request, &experiment);
         check_build(&experiment, &parts, stop)?;
         let is_complete = play(jobs, &parts, &experiment, stop);
-        if !is_complete.map_err(|e| anyhow!("{e:#}\n{}", how_to_resume(arguments)))? {
+        if !is_complete.map_err(|error| with_hint(error, &how_to_resume(arguments)))? {
             print_error(&format!("stopped; {}", how_to_resume(arguments)));
             return Ok(ExitStatus::Interrupted);
         }

@@ -16,7 +16,7 @@ use chaic_llm::language::{LanguageHelpers, is_language_helper, is_language_partn
 use chaic_llm::settings::Settings;
 use chaic_llm::show::{self, Detail};
 use chaic_llm::templates::Templates;
-use chaic_llm::{check, session};
+use chaic_llm::{check, record, session};
 use serde_json::{Value, json};
 
 use super::given_partners::is_partner_file;
@@ -79,12 +79,21 @@ fn record_text(
     let has_record = |name: &&String| is_language_helper(name) || agent == AgentId::PARTNER;
     let default = options.helpers.iter().find(has_record).map(String::as_str);
     let helper = helper.or(default).context("no helper of this run used a language model")?;
-    let path = find_trace(&folder, episode, Some(helper), seed)?;
-    let (trace, warnings) = folder.read_trace(&path)?;
-    for warning in warnings {
-        print_warning(&warning.to_string());
-    }
-    Ok(show::text(run, &trace.header.key(), agent, Some(&trace), detail)?)
+    let missing = match find_trace(&folder, episode, Some(helper), seed) {
+        Ok(path) => {
+            let (trace, warnings) = folder.read_trace(&path)?;
+            for warning in warnings {
+                print_warning(&warning.to_string());
+            }
+            return Ok(show::text(run, &trace.header.key(), agent, Some(&trace), detail)?);
+        }
+        Err(error @ EvalError::NoTrace { .. }) => error,
+        Err(error) => return Err(error.into()),
+    };
+    // An unfinished episode, or a run with --no-traces.
+    let key = record::find(run, episode, helper, seed, agent)?.ok_or(missing)?;
+    print_warning("the episode run has no trace, so the events between decisions are unknown");
+    Ok(show::text(run, &key, agent, None, detail)?)
 }
 
 /// Returns the language helpers of a run; `None` if it needs none.
@@ -157,8 +166,9 @@ fn check_names(arguments: &EvalArguments) -> Result<(), EnvError> {
 
 /// Returns the options of language helpers that a resumed run needs again.
 pub fn resume_options(given: &LanguageArguments) -> String {
-    let LanguageArguments { endpoint, model: _, llm_key_env, llm_allow_http, llm_config, llm } =
-        given;
+    let LanguageArguments { endpoint, model, llm_key_env, llm_allow_http, llm_config, llm } = given;
+    // A configuration file replaces all recorded settings, also the model.
+    let model = model.clone().filter(|_| llm_config.is_some());
     let option = |name: &str, value: Option<String>| {
         value.map_or(String::new(), |value| format!(" {name} {}", quoted(&value)))
     };
@@ -168,6 +178,7 @@ pub fn resume_options(given: &LanguageArguments) -> String {
         option("--llm-key-env", llm_key_env.clone()),
         if *llm_allow_http { " --llm-allow-http".to_owned() } else { String::new() },
         option("--llm-config", llm_config.as_ref().map(path)),
+        option("--model", model),
         option("--llm", llm.as_ref().map(|run| format!("replay:{}", run.display()))),
     ]
     .concat()

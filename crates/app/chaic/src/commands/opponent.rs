@@ -19,11 +19,11 @@ use chaic_learn::visual::helper::VisualWeights;
 use serde_json::json;
 
 use super::datasets::dataset_split;
-use super::{bars, write_json};
+use super::{bars, stopped_without_result, write_json};
 use crate::arguments::{CollectOpponentArguments, OpponentArguments, WindowArguments};
 use crate::exit::ExitStatus;
 use crate::interrupt;
-use crate::output::{OutputFormat, print_error, print_progress, print_result, quoted_path};
+use crate::output::{OutputFormat, print_progress, print_result, quoted_path};
 
 /// Largest size of a weight file, bytes.
 const MAX_BYTES: u64 = 1 << 28;
@@ -36,9 +36,7 @@ pub fn collect_windows(
     let stop = interrupt::stop_flag()?;
     let split = dataset_split(arguments.split);
     let config = collection(&arguments.windows);
-    let Some(windows) = play(&config, split, stop)? else {
-        return Ok(ExitStatus::Interrupted);
-    };
+    let Some(windows) = play(&config, split, stop)? else { return Ok(stopped_without_result()) };
     write(&arguments.out, &windows, arguments.windows.grant_behavior)?;
     let mut text = String::new();
     let mut counts = BTreeMap::new();
@@ -67,7 +65,7 @@ pub fn evaluate(arguments: &OpponentArguments, format: OutputFormat) -> Result<E
     config.granted = model.is_granted();
     let windows = play(&config, DatasetSplit::Test, stop)?;
     let report = windows.and_then(|windows| OpponentReport::new(&model, &windows, stop));
-    let Some(report) = report else { return Ok(ExitStatus::Interrupted) };
+    let Some(report) = report else { return Ok(stopped_without_result()) };
     print_result(format, &report, &report.text())?;
     write_json(arguments.json.as_deref(), &report)?;
     Ok(ExitStatus::Success)
@@ -115,9 +113,5 @@ fn play(
     };
     let windows = collect(split, config, &mut progress, stop);
     bar.finish_and_clear();
-    let windows = windows?;
-    if windows.is_none() {
-        print_error("stopped; nothing was written");
-    }
-    Ok(windows)
+    Ok(windows?)
 }

@@ -15,11 +15,11 @@ use chaic_vision::trained::TrainedDetector;
 use chaic_vision::views::LabeledView;
 
 use super::datasets::{collect_clips, view_config};
-use super::{bars, jobs, run_perception, write_json};
+use super::{bars, jobs, run_perception, stopped_without_result, write_json};
 use crate::arguments::{BehaviorArguments, ClipArguments, DetectionArguments, TracksArguments};
 use crate::exit::ExitStatus;
 use crate::interrupt;
-use crate::output::{OutputFormat, print_result};
+use crate::output::{OutputFormat, counted, print_progress, print_result};
 
 /// Evaluates a detector on held-out environments.
 pub fn evaluate_detection(
@@ -32,13 +32,20 @@ pub fn evaluate_detection(
     };
     let DetectionArguments { scenes, appearance, .. } = arguments;
     let config = view_config(*scenes, Some(*appearance));
+    let stop = interrupt::stop_flag()?;
+    let n_views = arguments.views as usize;
+    print_progress(&counted(n_views, "view"));
+    let bar = bars::count_bar(n_views as u64, "views");
     let coco_records = |k: usize, view: &LabeledView, found: &[Instance]| {
+        bar.inc(1);
         let is_wanted = arguments.coco.is_some();
         is_wanted.then(|| (annotate(k, view), results(k, view, found)))
     };
-    let n_views = arguments.views as usize;
-    let (report, records) =
-        report(&detector, DatasetSplit::Test, config, n_views, jobs(arguments.jobs), coco_records);
+    let n_threads = jobs(arguments.jobs);
+    let split = DatasetSplit::Test;
+    let evaluated = report(&detector, split, config, n_views, n_threads, coco_records, stop);
+    bar.finish_and_clear();
+    let Some((report, records)) = evaluated else { return Ok(stopped_without_result()) };
     print_result(format, &report, &detection_text(&report, arguments))?;
     if let Some(folder) = &arguments.coco {
         let (annotations, results): (Vec<_>, Vec<_>) = records.into_iter().flatten().unzip();
@@ -67,7 +74,7 @@ pub fn evaluate_behavior(
     let clips = collect_clips(&arguments.clips, &*perception, DatasetSplit::Test, None, stop)?;
     let n_threads = jobs(arguments.clips.jobs);
     let report = clips.and_then(|clips| behavior_report(&network, &clips, n_threads, stop));
-    let Some(report) = report else { return Ok(ExitStatus::Interrupted) };
+    let Some(report) = report else { return Ok(stopped_without_result()) };
     print_result(format, &report, &behavior_text(&report, &arguments.clips))?;
     write_json(arguments.json.as_deref(), &report)?;
     Ok(ExitStatus::Success)
@@ -90,7 +97,7 @@ pub fn evaluate_tracks(arguments: &TracksArguments, format: OutputFormat) -> Res
         stop,
     );
     bar.finish_and_clear();
-    let Some(report) = report else { return Ok(ExitStatus::Interrupted) };
+    let Some(report) = report else { return Ok(stopped_without_result()) };
     print_result(format, &report, &tracks_text(&report, &arguments.perception))?;
     write_json(arguments.json.as_deref(), &report)?;
     Ok(ExitStatus::Success)

@@ -41,6 +41,14 @@ pub(super) fn seal(
     out: &Path,
     format: OutputFormat,
 ) -> Result<ExitStatus> {
+    let partners_path = out.join(PARTNERS);
+    if size.n_partners == 0 && partners_path.exists() {
+        let text = format!(
+            "{} belongs to another split; remove it, or choose another --out",
+            partners_path.display()
+        );
+        return Err(EvalError::Options(text).into());
+    }
     let secret = if secret_path.exists() {
         Secret::read(secret_path)?
     } else {
@@ -51,7 +59,7 @@ pub(super) fn seal(
     let Some(commitment) = write_episodes(&split, &episodes)? else {
         return Ok(ExitStatus::Interrupted);
     };
-    let partners = split.partners().map(|suite| (out.join(PARTNERS), suite));
+    let partners = split.partners().map(|suite| (partners_path, suite));
     if let Some((path, suite)) = &partners {
         write_atomically(path, suite.to_json().as_bytes())?;
     }

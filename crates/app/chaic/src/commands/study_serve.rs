@@ -138,9 +138,10 @@ mod own_helpers {
         Ok(Box::leak(Box::new(CommandRegistry::new(policies, programs, stop)?)))
     }
 
-    /// Adds to the error of a missing helper how to give one.
+    /// Adds to the error of a missing helper how to give one. Wrong names of the server are invalid requests too.
     pub(super) fn with_hint(error: ServerError) -> anyhow::Error {
         match error {
+            ServerError::HostName(_) | ServerError::NoHostName(_) => invalid(&error.to_string()),
             ServerError::Helper(problem) => {
                 invalid(&format!("{problem}; give your own with --helper NAME=exec:COMMAND"))
             }

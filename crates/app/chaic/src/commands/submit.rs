@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use anyhow::{Result, anyhow};
+use anyhow::Result;
 use chaic_arena::archive::pack;
 use chaic_arena::{
     Commitment, Evaluation, EvaluationReport, HelperSource, Manifest, Submission, SubmissionScore,
@@ -31,7 +31,7 @@ use crate::arguments::{
     SubmitCheckArguments, SubmitCommand, SubmitPackArguments, SubmitRunArguments,
     SubmitScoreArguments, SubmitVerifyArguments,
 };
-use crate::exit::ExitStatus;
+use crate::exit::{ExitStatus, with_hint};
 use crate::interrupt;
 use crate::output::{
     OutputFormat, counted, print, print_error, print_progress, print_result, quoted_path,
@@ -234,7 +234,7 @@ fn play_run(
     let played = run.play(jobs, registry, stop, &mut |event| bars.show(event));
     bars.clear();
     let how_to_continue = "the same command continues";
-    if !played.map_err(|error| anyhow!("{error:#}\n{how_to_continue}"))? {
+    if !played.map_err(|error| with_hint(error.into(), how_to_continue))? {
         let extent = run.progress();
         let total = counted(extent.total, "episode run");
         print_error(&format!("stopped after {} of {total}; {how_to_continue}", extent.finished));

@@ -215,12 +215,14 @@ fn exit_codes_agree_with_the_documentation() {
     let dir = short_episodes();
     let at = dir.path();
     let usage = ["eval", "--out", "run"];
+    let generate = ["episodes", "generate", "--task", "obstacle", "--out", "x", "--seeds"];
     for (arguments, code, words) in [
         (&["episodes", "schema"][..], 0, ""),
         (&["report", "nowhere"], 1, "no run.json"),
         (&["eval", "--resume", "--out", "nowhere"], 1, "no run.json"),
         (&["episodes", "validate", "nowhere.json"], 1, "can't open nowhere.json"),
         (&["render", "obstacle/test/99", "--out", "x"], 2, "obstacle/test/99"),
+        (&[&generate[..], &["0..824633720833"]].concat(), 2, "A < B <= 824633720832"),
         (
             &[&usage[..], &["--helper", "nobody"]].concat(),
             2,

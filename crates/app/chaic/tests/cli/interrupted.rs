@@ -165,3 +165,22 @@ fn an_interrupted_replay_leaves_no_torn_video() {
         assert_eq!(left.len(), if code.is_some() { 1 } else { 2 }, "{left:?}");
     }
 }
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_evaluation_of_a_detector_says_so() {
+    use std::io::{BufRead as _, BufReader, Read as _};
+    let dir = tempfile::tempdir().expect("the disk has space");
+    let at = dir.path();
+    let evaluate = ["eval", "detection", "--views", "100000", "--jobs", "1"];
+    let mut child = start(at, &[&evaluate[..], &["--json", "report.json"]].concat());
+    let mut messages = BufReader::new(child.stderr.take().expect("it is piped"));
+    let mut message = String::new();
+    messages.read_line(&mut message).expect("it names the number of views when it starts");
+    let id = child.id().to_string();
+    assert!(Command::new("kill").args(["-TERM", &id]).status().expect("there is a kill").success());
+    messages.read_to_string(&mut message).expect("it is text");
+    assert_eq!(child.wait().expect("it ends").code(), Some(130), "{message}");
+    assert!(message.contains("stopped; nothing was written\n"), "{message}");
+    assert!(!at.join("report.json").exists());
+}

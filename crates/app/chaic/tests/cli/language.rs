@@ -221,6 +221,25 @@ fn no_control_character_reaches_the_terminal() {
     assert!(message.contains("\\u001b"), "what was there is reply: {message}");
 }
 
+#[test]
+fn a_record_without_a_trace_is_shown() {
+    let dir = short_episodes();
+    let at = dir.path();
+    let server = standin(Options::default());
+    let url = server.url();
+    run_ok(at, &[&play(&url, "run")[..], &["--no-traces"]].concat());
+    let show = ["llm", "show", "run", "no_constraint/gen/0"];
+    let out = output_of(at, &show);
+    let (shown, warning) = (text(&out.stdout), text(&out.stderr));
+    assert!(shown.starts_with("no_constraint/gen/0 with helper llm, seed 0"), "{shown}");
+    assert!(shown.contains("## Plans") && shown.contains(">>> frame "), "{shown}");
+    assert!(out.status.success() && warning.contains("has no trace"), "{warning}");
+    for wrong in [&["--seed", "1"], &["--agent", "partner"]] {
+        let message = run_err(at, &[&show[..], wrong].concat());
+        assert!(message.contains("has no trace of no_constraint/gen/0"), "{message}");
+    }
+}
+
 /// Waits until `is_true`. After a timeout it kills `child` and fails.
 #[cfg(unix)]
 fn until(child: &mut Child, what: &str, mut is_true: impl FnMut(&mut Child) -> bool) {
@@ -271,7 +290,8 @@ fn a_silent_endpoint_does_not_block_ctrl_c() {
     let ended = child.wait_with_output().expect("it has ended");
     let message = text(&ended.stderr);
     assert_eq!(ended.status.code(), Some(130), "{message}");
-    let hint = format!("chaic eval --resume --out run --endpoint {url} --llm-config slow.toml");
+    let options = ["--llm-config", "slow.toml", "--model", "standin"];
+    let hint = format!("chaic eval --resume --out run --endpoint {url} {}", options.join(" "));
     assert!(message.contains(&hint), "{message}");
 
     let record = at.join("run/llm/no_constraint/llm/gen-0-s0.helper.jsonl");
@@ -281,11 +301,13 @@ fn a_silent_endpoint_does_not_block_ctrl_c() {
     assert!(record.lines().all(is_whole), "{record}");
     let answers = record.lines().filter(|line| line.contains("\"answer\":{")).count();
     assert_eq!(answers, ANSWERED, "{record}");
+    let shown = run_ok(at, &["llm", "show", "run", "no_constraint/gen/0", "--brief"]);
+    assert!(shown.contains(&format!("{ANSWERED:>8} questions")), "{shown}");
 
     let answers = standin(Options::default());
     let url = answers.url();
     let resume = ["eval", "--resume", "--out", "run", "--endpoint", &url];
-    assert!(run_ok(at, &resume).contains("LLM"));
+    assert!(run_ok(at, &[&resume[..], &options].concat()).contains("LLM"));
     let whole = [&play(&url, "whole")[..], &task].concat();
     run_ok(at, &whole);
     let scores = |run: &str| run_ok(at, &["report", run, "--format", "json"]);

@@ -228,6 +228,15 @@ fn fidelity_from_end_to_end() {
         assert!(run_err(at, command).contains("--no-traces"), "{command:?}");
     }
 
+    // A resumed experiment compares the episodes.
+    fs::create_dir(at.join("none")).expect("the disk has space");
+    let resume = ["fidelity", "--resume", "--out", "fid", "--episodes"];
+    run_ok(at, &[&resume[..], &["short"]].concat());
+    let other = output_of(at, &[&resume[..], &["none"]].concat());
+    let message = text(&other.stderr);
+    assert!(message.contains("started with other episodes than --episodes none"), "{message}");
+    assert_eq!(other.status.code(), Some(2), "{message}");
+
     // A killed run lacks a result and the report. The document names what is missing, and a resumed run
     // gives the same document.
     assert!(run_err(at, &begin).contains("isn't empty"));
@@ -284,6 +293,11 @@ fn wrong_option_values_end_in_the_same_exit_code() {
         &["eval", "--resume", "--out", "run", "--model", "m"],
         &["eval", "--model", "m", "--out", "r"],
         &["report", "run", "--figure", "f.txt"],
+        &["export", "lerobot", "run", "--out", "set", "--size", "33"],
+        &["export", "lerobot", "run", "--out", "set", "--every", "7"],
+        &["export", "episodes", "--split", "train", "--task", "tremor", "--out", "set"],
+        &["fidelity", "--episodes", "short", "--helper", "rhp", "--out", "f"],
+        &["study", "delete", "lowercase", "short"],
         &[&replay[..], &["--out", "r.avi"]].concat()[..],
         &[&replay[..], &["--out", "r.gif", "--fps", "51"]].concat()[..],
         &["episodes", "generate", "--task", "obstacle", "--seeds", "3..3", "--out", "x"],

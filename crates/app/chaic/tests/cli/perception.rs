@@ -255,8 +255,7 @@ fn data_sets_are_complete_and_collected_once() {
     let written = fs::metadata(&file).unwrap().modified().unwrap();
     run_ok(dir, &[&clips[..], &["--clips", "2"]].concat());
     assert_eq!(fs::metadata(&file).unwrap().modified().unwrap(), written, "it was written again");
-    assert!(
-        run_err(dir, &[&clips[..], &["--clips", "3"]].concat())
-            .contains("of another configuration")
-    );
+    let other = output_of(dir, &[&clips[..], &["--clips", "3"]].concat());
+    assert!(text(&other.stderr).contains("of another configuration"));
+    assert_eq!(other.status.code(), Some(2));
 }

@@ -14,6 +14,9 @@ fn standard_episodes_are_listed_written_and_checked() {
     assert_eq!(list.len(), 100);
     assert_eq!(list[99]["id"], "moving_house/standard/099");
     assert_eq!(list[99]["generator"]["settings"]["varied_layout"], true);
+    let out = output_of(at, &["episodes", "list", "--split", "train", "--task", "tremor"]);
+    assert!(out.status.success() && out.stdout.is_empty(), "{}", text(&out.stdout));
+    assert!(text(&out.stderr).contains("train has no episodes of tremor"), "{}", text(&out.stderr));
 
     let split = ["--split", "gen-standard:7..9"];
     let generate = ["episodes", "generate", "--task", "obstacle", "--out", "e"];
@@ -86,6 +89,10 @@ fn a_sealed_split_is_played_and_opened_by_its_secret_alone() {
     let partners = ["sealed/partners.json", "partners.json"].map(|file| fs::read(at.join(file)));
     let [sealed, opened] = partners.map(|bytes| bytes.expect("a list of partners"));
     assert!(sealed == opened && sealed.starts_with(b"{"));
+
+    // Partners that are not committed would be played with the split.
+    let refused = run_err(at, &[&seal[..], &["--n-episodes", "1", "--out", "sealed"]].concat());
+    assert!(refused.contains("partners.json belongs to another split"), "{refused}");
 
     fs::write(at.join("other"), "0".repeat(64)).expect("the disk has space");
     let refused = run_err(at, &[&open[..], &["--secret", "other"]].concat());

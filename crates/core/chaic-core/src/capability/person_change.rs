@@ -23,7 +23,7 @@ const IMPAIRMENT_CHANCE: f32 = 0.25;
 const DRAWN_IMPAIRMENTS: [Impairment; 3] =
     [Impairment::LowVision, Impairment::Tires, Impairment::Tremor];
 
-/// Change of a person, written as words with `+` between them: a persona, impairments, and `speedN`
+/// Change of a partner, written as words with `+` between them: a persona, impairments, and `speedN`
 /// for N percent of the walking speed. `child+one_handed` is another person, and `+tires+speed80` is
 /// the same person, who tires and walks more slowly.
 ///
@@ -47,10 +47,12 @@ impl PersonChange {
     /// Returns all words and their syntax, for messages.
     pub fn choices() -> String {
         let (low, high) = (SPEED_PERCENT.start(), SPEED_PERCENT.end());
+        let people = partner_personas().map(Persona::name).collect::<Vec<_>>().join(", ");
+        let impairments = IMPAIRMENTS.map(|i| i.name).join(", ");
         format!(
-            "{}, and +{SPEED}N for a walking speed of N percent, {low} to {high}; without a person, the \
-             changes apply to the person of the episode, like +{}",
-            PersonKind::choices(),
+            "one of {people}; add + and a name for each impairment: {impairments}, and +{SPEED}N for a \
+             walking speed of N percent, {low} to {high}; without a person, the changes apply to the person \
+             of the episode, like +{}",
             IMPAIRMENTS[0].name,
         )
     }
@@ -89,6 +91,11 @@ impl PersonChange {
         let change = PersonChange { persona: None, impairments, speed_percent };
         (change != PersonChange::NONE).then_some(change)
     }
+}
+
+/// Returns the personas that a partner can have.
+fn partner_personas() -> impl Iterator<Item = Persona> {
+    Persona::ALL.into_iter().filter(|persona| *persona != Persona::Helper)
 }
 
 impl From<PersonKind> for PersonChange {
@@ -146,7 +153,7 @@ impl FromStr for PersonChange {
             match (k, word.strip_prefix(SPEED), impairment) {
                 (0, ..) if word.is_empty() => {}
                 (0, ..) => {
-                    let persona = Persona::ALL.into_iter().find(|p| p.name() == word);
+                    let persona = partner_personas().find(|p| p.name() == word);
                     change.persona = Some(persona.ok_or_else(unknown)?);
                 }
                 (_, _, Some(info)) => change.impairments = change.impairments.with(info.id),
@@ -179,6 +186,9 @@ mod tests {
             let error = text.parse::<PersonChange>().expect_err(text).to_string();
             assert!(error.contains("50 to 200") && !error.contains('\n'), "{error}");
         }
+        // A partner is no helper.
+        let error = "helper+tires".parse::<PersonChange>().expect_err("no partner").to_string();
+        assert!(error.contains("one of adult, child, wheelchair, rider, frail;"), "{error}");
     }
 
     #[test]

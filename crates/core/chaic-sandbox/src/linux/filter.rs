@@ -34,10 +34,12 @@ const DENIED: &[c_long] = &[
     libc::SYS_mount_setattr,
     libc::SYS_open_by_handle_at,
     libc::SYS_name_to_handle_at,
-    // Memory outside the limits: files without a folder, and System V segments.
+    // Memory outside the limits: files without a folder, and System V objects.
     libc::SYS_memfd_create,
     libc::SYS_memfd_secret,
     libc::SYS_shmget,
+    libc::SYS_semget,
+    libc::SYS_msgget,
     libc::SYS_mq_open,
     // The kernel itself, and interfaces with a history of kernel vulnerabilities.
     libc::SYS_bpf,

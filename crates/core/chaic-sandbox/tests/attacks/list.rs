@@ -331,6 +331,16 @@ if ctypes.get_errno() in (0, errno.EFAULT): success()
         "if call(29 if X86 else 194, 0, 1 << 20, 0o1600) < 0: sys.exit()\nlibc.shmctl(libc.shmget(0, 1, 0o1600), 0, None)\nsuccess()",
     ),
     word(
+        "memory-semaphores",
+        "use memory of the kernel in System V semaphores",
+        "made = libc.semget(0, 1000, 0o1600)\nif made < 0: sys.exit()\nlibc.semctl(made, 0, 0)\nsuccess()",
+    ),
+    word(
+        "memory-messages",
+        "use memory of the kernel in System V messages",
+        "made = libc.msgget(0, 0o1600)\nif made < 0: sys.exit()\nlibc.msgctl(made, 0, None)\nsuccess()",
+    ),
+    word(
         "fill-shared-memory",
         "fill the folder of shared memory",
         "with open('/dev/shm/chaic-attack', 'wb') as f:\n    os.remove('/dev/shm/chaic-attack')\n    for _ in range(100): f.write(bytes(1 << 20))\nsuccess()",

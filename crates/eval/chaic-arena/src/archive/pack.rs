@@ -35,8 +35,13 @@ pub struct PackedArchive {
 ///
 /// # Errors
 /// [`ArenaError`](crate::ArenaError) if an entry is no regular file or folder, a name or size is not
-/// allowed in archives, or a file cannot be read or written.
+/// allowed in archives, the archive would lie inside the folder, or a file cannot be read or written.
 pub fn pack(folder: &Path, archive: &Path) -> Result<PackedArchive> {
+    if lies_inside(archive, folder) {
+        let archive = archive.display();
+        let problem = format!("its archive {archive} would lie inside; choose another place");
+        return Err(refused(folder, problem));
+    }
     let temporary = with_suffix(archive, TEMPORARY_SUFFIX);
     let file = create_or_replace(&temporary).map_err(FileError::context("create", &temporary))?;
     let mut output = Hashed::new(BufWriter::new(file));
@@ -63,6 +68,14 @@ pub fn content_sha256(folder: &Path) -> Result<String> {
     let mut output = Hashed::new(io::sink());
     write_archive(folder, &mut output)?;
     Ok(to_hex(&output.digest.finalize()))
+}
+
+/// Returns whether a file that may not exist yet lies inside a folder, also through links.
+fn lies_inside(file: &Path, folder: &Path) -> bool {
+    let parent = file.parent().filter(|parent| !parent.as_os_str().is_empty());
+    let parent = parent.unwrap_or(Path::new(".")).canonicalize();
+    let folder = folder.canonicalize();
+    parent.is_ok_and(|parent| folder.is_ok_and(|folder| parent.starts_with(folder)))
 }
 
 /// Writer that computes a digest.

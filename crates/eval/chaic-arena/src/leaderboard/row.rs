@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use chaic_core::TaskId;
-use chaic_eval::metrics::{HelperResults, Interval, Score, mean_rate};
+use chaic_eval::metrics::{HelperResults, Interval, MeanRate, Score, mean_rate};
 use chaic_eval::report::{RecordedGrants, title};
 use serde::Serialize;
 
@@ -103,7 +103,8 @@ impl LeaderboardRow {
     /// Returns the row of a helper with its scores alone; `None` without results.
     pub(super) fn from_results(entry: &ConfirmedEntry, helper: &str) -> Option<LeaderboardRow> {
         let results = HelperResults { results: &entry.results, helper };
-        let (tr, interval) = mean_rate(results, &entry.environments)?;
+        let MeanRate { mean: tr, interval, environments } =
+            mean_rate(results, &entry.environments)?;
         let scores = entry.score.tasks.iter();
         let scores: Vec<(TaskId, &Score)> =
             scores.filter_map(|(task, row)| Some((*task, row.get(helper)?))).collect();
@@ -122,7 +123,7 @@ impl LeaderboardRow {
             tr,
             tr_ci: interval.map(|interval| interval.clamped(0.0, 1.0)),
             ei: (n > 0.0).then(|| improvements.iter().sum::<f64>() / n),
-            environments: interval.map_or(0, |interval| interval.environments),
+            environments,
             failed: scores.iter().map(|(_, score)| score.failed).sum(),
             tasks: scores
                 .into_iter()

@@ -145,6 +145,18 @@ fn differences_are_paired_with_rhp_and_adjusted() {
 }
 
 #[test]
+fn one_environment_is_counted_although_it_has_no_interval() {
+    let mut mine = entry("mine", &rules("a", "unrestricted"), [5; 6]);
+    let house =
+        |k: u32| (TaskId::Obstacle, format!("obstacle/sealed/{k:03}"), "house/a".to_owned());
+    mine.environments = Environments::new((0..6).map(house));
+    let board = leaderboard(vec![mine]);
+    let [table] = &board.tables[..] else { panic!("one table") };
+    assert_eq!((table.environments, table.rows[0].tr_ci), (1, None));
+    assert!(board.to_html("t").contains("<dt>Environments</dt><dd>1</dd>"));
+}
+
+#[test]
 fn repeated_and_contradictory_evaluations_are_refused() {
     let unrestricted = rules("a", "unrestricted");
     let mut cheater = entry("cheater", &unrestricted, [9; 6]);

@@ -83,6 +83,19 @@ fn folders_with_links_are_not_packed() {
 }
 
 #[test]
+fn an_archive_inside_its_own_folder_is_refused() {
+    let dir = tempfile::tempdir().expect("the disk has space");
+    let at = dir.path().join("a");
+    write_submission(&at);
+    let before = content_sha256(&at).expect("a plain folder");
+    for archive in ["a.tar", "helper/a.tar"] {
+        let error = pack(&at, &at.join(archive)).expect_err("it lies inside").to_string();
+        assert!(error.contains("would lie inside"), "{error}");
+    }
+    assert_eq!(content_sha256(&at).expect("a plain folder"), before, "no file is left");
+}
+
+#[test]
 fn archives_of_other_programs_are_read() {
     let dir = tempfile::tempdir().expect("the disk has space");
     let at = dir.path();

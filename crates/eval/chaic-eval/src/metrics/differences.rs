@@ -34,6 +34,17 @@ pub struct Resolution {
     pub largest: f64,
 }
 
+/// Mean transport rate of a helper over the episodes of all tasks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MeanRate {
+    /// The mean.
+    pub mean: f64,
+    /// Its 95 % interval over environments, if there are enough of them.
+    pub interval: Option<Interval>,
+    /// Number of environments in which the episodes take place.
+    pub environments: usize,
+}
+
 /// Computes paired differences of the transport rate between all helpers, by episode (seeds
 /// averaged), with 95 % intervals over environments.
 ///
@@ -80,13 +91,12 @@ pub fn paired_difference(
     difference((&groups, a.helper), (&baseline_groups, b.helper), environments).0
 }
 
-/// Returns the mean transport rate of a helper over the episodes of all tasks, and its 95 % interval
-/// over environments if there are enough of them; `None` without results. Seeds are averaged, and
-/// failed runs count as zero.
+/// Returns the mean transport rate of a helper; `None` without results. Seeds are averaged, and failed
+/// runs count as zero.
 pub fn mean_rate(
     HelperResults { results, helper }: HelperResults<'_>,
     environments: &Environments,
-) -> Option<(f64, Option<Interval>)> {
+) -> Option<MeanRate> {
     let groups = grouped(results);
     let mut all = Clusters::default();
     for (task, by_helper) in &groups {
@@ -95,7 +105,8 @@ pub fn mean_rate(
             all.add(*task, environments.get(*task, episode), over_seeds(runs, Summary::rate));
         }
     }
-    Some((all.mean()?, all.interval()))
+    let (interval, environments) = (all.interval(), all.environments());
+    Some(MeanRate { mean: all.mean()?, interval, environments })
 }
 
 /// Compares two helpers, each with the results of its run, on the episodes that both have; also

@@ -1,4 +1,5 @@
-//! Promise: an image shows the belief of the helper in free space, whatever its texts.
+//! Promises: an image shows the belief of the helper in free space, whatever its texts; a video begins
+//! with the first frame and ends with the last one.
 
 use chaic_core::agent::{PartnerBelief, Thought};
 use chaic_core::{Action, ClassId};
@@ -28,8 +29,8 @@ fn belief(words: &str) -> PartnerBelief {
     }
 }
 
-/// Renders the frame after the first decision of a helper with this belief.
-fn render(id: &str, belief: Option<PartnerBelief>) -> RgbImage {
+/// Trace of one frame with the first decision of a helper with this belief.
+fn short_trace(id: &str, belief: Option<PartnerBelief>) -> (Trace, Episode) {
     let episode = find_episode(id).unwrap();
     let config = EpisodeConfig::new(&episode, "infer");
     let helper = BuiltInHelpers.make("infer", config.rules.planner);
@@ -49,6 +50,12 @@ fn render(id: &str, belief: Option<PartnerBelief>) -> RgbImage {
         stuck_frames: 0,
         digest,
     }));
+    (trace, episode)
+}
+
+/// Renders the frame after the first decision of a helper with this belief.
+fn render(id: &str, belief: Option<PartnerBelief>) -> RgbImage {
+    let (trace, episode) = short_trace(id, belief);
     let mut replay = Replay::new(&trace, &episode).unwrap();
     assert!(replay.step().unwrap());
     replay.render(None)
@@ -75,6 +82,24 @@ fn a_belief_adds_bars_and_a_ring_on_the_map() {
         let image = render(id, Some(belief("a long description of an operation")));
         assert!(has_margin(&image), "{id}");
     }
+}
+
+#[test]
+fn a_video_begins_with_the_first_frame_and_ends_with_the_last() {
+    let (trace, episode) = short_trace("high_goal/test/00", None);
+    let mut replay = Replay::new(&trace, &episode).unwrap();
+    let first = replay.render(None);
+    let mut images: Vec<RgbImage> = Vec::new();
+    let mut sink = |image: &RgbImage| -> Result<()> {
+        images.push(image.clone());
+        Ok(())
+    };
+    let mut progress = |_: Frame| ControlFlow::Continue(());
+    let flow = draw_images(&mut replay, 30, None, &mut progress, &mut sink).unwrap();
+    assert!(flow.is_continue());
+    let last = replay.render(None);
+    assert!(first != last, "the header shows the frame");
+    assert!(images == [first, last], "{} images", images.len());
 }
 
 #[test]

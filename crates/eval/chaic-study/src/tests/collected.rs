@@ -239,6 +239,40 @@ fn hostile_files_are_refused_in_one_line() {
 }
 
 #[test]
+fn an_incomplete_last_line_is_left_out_and_reported() {
+    let (dir, path) = folder_with(SMALL);
+    let plan = plan_of(&path).expect("a valid study");
+    let records = records(&plan, CODE, 1);
+    let whole: Vec<String> = records.iter().map(|record| format!("{record}\n")).collect();
+    let file = dir.path().join("a.jsonl");
+    let exported = |bytes: &[u8], out: &str| {
+        fs::write(&file, bytes).expect("the disk has space");
+        export(&plan, std::slice::from_ref(&file), &dir.path().join(out))
+    };
+    let (before, last) = (whole[..13].concat(), &whole[13]);
+    for (k, torn) in [&last[..8], "{\"type\":\"caf\u{e9}"].into_iter().enumerate() {
+        // The second line ends within a character.
+        let text = format!("{before}{torn}");
+        let report = exported(&text.as_bytes()[..text.len() - 1], &format!("torn{k}"));
+        let report = report.expect("the other records are whole");
+        assert_eq!((report.participants, report.completed, report.traces), (1, 0, 1));
+        let note = format!("{}, line 14: the line is incomplete and left out", file.display());
+        assert_eq!(report.problems, [note]);
+    }
+    // Only the end of the line is missing.
+    let text = whole.concat();
+    let report = exported(text.trim_end().as_bytes(), "unterminated").expect("valid records");
+    assert_eq!((report.completed, report.problems), (1, Vec::new()));
+    // An interrupted write leaves no damage elsewhere.
+    let damaged = text.replacen("\"type\":\"instructed\"}", "\"type\":\"instr", 1);
+    let message = exported(damaged.as_bytes(), "damaged").expect_err("line 2").to_string();
+    assert!(message.contains("a.jsonl, line 2: no record"), "{message}");
+    let message = exported(b"{\"type\":\"sta", "empty").expect_err("no record").to_string();
+    assert!(message.contains("the first record must be `start`"), "{message}");
+    assert!(!dir.path().join("damaged").exists() && !dir.path().join("empty").exists());
+}
+
+#[test]
 fn a_deleted_participant_leaves_no_bytes_behind() {
     let (dir, path) = folder_with(SMALL);
     let plan = plan_of(&path).expect("a valid study");

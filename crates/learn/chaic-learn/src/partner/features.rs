@@ -6,7 +6,7 @@ use chaic_agents::decision::{Context, HandState, Plan};
 use chaic_core::briefing::CompanionRole;
 use chaic_core::geom::{horizontal_distance, to_xz};
 use chaic_core::task::SceneKind;
-use chaic_core::{ClassId, Frame, Role, Vec3};
+use chaic_core::{Action, ClassId, Frame, Role, Vec3};
 
 use crate::candidate_scorer::CandidateSet;
 use crate::scales::{
@@ -199,7 +199,10 @@ impl<'a> Choice<'a> {
         let n_containers = available.filter(|o| briefing.containers.contains(&o.class)).count();
         let helper = memory.companion(briefing, CompanionRole::Partner);
         let position = memory.pose.position;
-        let failures = memory.history.iter().rev().take_while(|r| !r.outcome.is_success());
+        let interactions = memory.history.iter().rev();
+        // Policies were trained without put-ins in the history.
+        let interactions = interactions.filter(|r| !matches!(r.action, Action::PutIn));
+        let failures = interactions.take_while(|r| !r.outcome.is_success());
         let is_furniture = |class: &ClassId| class.info().role == Role::HeavyTarget;
         let is_street = scene_of(&briefing.possible_targets) == Some(SceneKind::Street);
         let [low_m, high_m] = body.pick_range_m;

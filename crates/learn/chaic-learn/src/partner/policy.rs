@@ -80,12 +80,7 @@ impl LearnedPartnerPolicy {
     fn choose_among(&mut self, observation: &CandidateSet) -> usize {
         let PartnerWeights { model, parameters, .. } = &*self.weights;
         let outputs = model.forward(parameters, std::iter::once(observation), &mut self.pass);
-        match self.selection {
-            ActionSelection::Sample { temperature } => {
-                outputs[0].sample_at(temperature, self.rng.unit())
-            }
-            ActionSelection::Greedy => outputs[0].argmax(),
-        }
+        self.selection.select(&outputs[0], &mut self.rng)
     }
 }
 

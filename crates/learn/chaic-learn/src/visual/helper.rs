@@ -21,6 +21,7 @@ use super::observation::{VisualObservation, opponent_features};
 use crate::actor_critic::ActorCritic as _;
 use crate::opponent::network::{OpponentInput, OpponentModel};
 use crate::opponent::tracker::OpponentTracker;
+use crate::policy::ActionSelection;
 
 /// Network with parameter values.
 #[derive(Clone, Debug)]
@@ -241,8 +242,8 @@ pub(crate) struct BegunAction {
     pub(crate) is_invalid: bool,
 }
 
-/// Random stream of the decisions. Another name would move the scores of `rl_paper`.
-const RNG_STREAM: &str = "primitive policy";
+/// Random stream of the decisions.
+const RNG_STREAM: &str = "visual policy";
 
 /// Helper that acts by a visual policy.
 pub struct VisualHelper {
@@ -305,7 +306,7 @@ impl Agent for VisualHelper {
         let rgb = observation.images.rgb.as_deref();
         let Some(encoded) = self.encoder.encode(observation, rgb) else { return Ok(PAUSE) };
         let output = model.forward(parameters, std::iter::once(&encoded), pass).remove(0);
-        let action_index = output.sample(self.rng.unit());
+        let action_index = ActionSelection::HELPER.select(&output, &mut self.rng);
         let action_space = model.action_space();
         let is_primitive = action_space == ActionSpace::Primitives;
         self.last_primitive = is_primitive.then(|| PRIMITIVES[action_index]);

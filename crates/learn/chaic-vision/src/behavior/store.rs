@@ -42,6 +42,13 @@ pub enum StoreError {
     Config(PathBuf),
 }
 
+impl StoreError {
+    /// Returns whether the caller's request caused the error.
+    pub fn is_usage(&self) -> bool {
+        matches!(self, StoreError::Config(_))
+    }
+}
+
 /// Folder of clips of one split, perception and configuration.
 #[derive(Clone, Debug)]
 pub struct ClipFolder(PathBuf);

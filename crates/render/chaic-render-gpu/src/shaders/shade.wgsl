@@ -23,7 +23,7 @@
 @group(0) @binding(11) var<storage, read> depth: array<f32>;
 // Input: visibility id; output: color. Shape [view, row, column].
 @group(0) @binding(12) var<storage, read_write> color: array<u32>;
-@group(0) @binding(13) var<uniform> round: RoundParams;
+@group(0) @binding(13) var<uniform> params: RoundParams;
 
 // `SkinRecord` of records.rs.
 struct Material {
@@ -102,11 +102,11 @@ struct Reflection {
 
 @compute @workgroup_size(8, 8)
 fn shade(@builtin(global_invocation_id) at: vec3u) {
-    if (at.x >= round.width || at.y >= round.height) {
+    if (at.x >= params.width || at.y >= params.height) {
         return;
     }
-    let v = round.first_view + at.z;
-    let pixel = (v * round.height + at.y) * round.width + at.x;
+    let v = params.first_view + at.z;
+    let pixel = (v * params.height + at.y) * params.width + at.x;
     let view = views[v];
     if (view.focal == 0.0) {
         color[pixel] = 0xff000000u;
@@ -122,7 +122,8 @@ fn shade(@builtin(global_invocation_id) at: vec3u) {
     } else {
         display = surface_color(view, light, visibility_id, ray, depth[pixel]);
     }
-    let rgb8 = vec3u(clamp(display, vec3f(0.0), vec3f(255.0)));
+    // A conversion to integers truncates; `chaic-render` rounds.
+    let rgb8 = vec3u(round(clamp(display, vec3f(0.0), vec3f(255.0))));
     color[pixel] = rgb8.x | (rgb8.y << 8u) | (rgb8.z << 16u) | 0xff000000u;
 }
 

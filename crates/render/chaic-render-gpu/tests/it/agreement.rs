@@ -3,9 +3,9 @@
 //! levels on average.
 
 use crate::common::{episode, gpu, views};
-use chaic_core::TaskId;
-use chaic_core::Vec3;
+use chaic_core::geom::Camera;
 use chaic_core::observation::Images;
+use chaic_core::{AgentId, EntityId, TaskId, Vec3};
 use chaic_render::{Appearance, Channels, Scene, View};
 use chaic_render_gpu::WorldId;
 use chaic_world::{ObjectLocation, World};
@@ -119,6 +119,39 @@ fn other_appearances_agree_with_the_cpu() {
             .for_each(|(a, b)| difference.add(a, b));
         difference.check(&format!("{id}, {appearance}"));
     }
+}
+
+/// Returns the color of each pixel that shows the sky.
+fn sky_colors(images: &Images) -> Vec<Option<[u8; 3]>> {
+    let rgb = images.rgb.as_ref().expect("the channel was requested").as_chunks::<3>().0;
+    let ids = images.ids.as_ref().expect("the channel was requested");
+    let is_sky = |id: u16| id == EntityId::NOTHING.0;
+    rgb.iter().zip(ids).map(|(color, id)| is_sky(*id).then_some(*color)).collect()
+}
+
+#[test]
+fn colors_are_rounded_as_on_the_cpu() {
+    /// Side of the image. The CPU interpolates the sky between samples 64 pixels apart, here with
+    /// an error of 0.05 gray levels. Truncated colors differ by half a level.
+    const SIZE_PX: u32 = 512;
+    let Some(mut gpu) = gpu("rounding") else { return };
+    let (world, scene) = episode("shopping/train/02");
+    let id = gpu.add(&scene, &world).expect("the world fits on the device");
+    let up = chaic_core::Quat::from_rotation_x(1.2);
+    let camera = Camera { world_from_camera: up, ..world.camera(AgentId::PARTNER, SIZE_PX) };
+    let view = View::from_eye(AgentId::PARTNER, camera, Channels::ALL);
+    let batch = gpu.render(&[(id, view)]).expect("the batch is valid");
+    let gpu_colors = sky_colors(&batch.read().expect("the images can be read")[0]);
+    let cpu_colors = sky_colors(&scene.render(&world, &[view])[0]);
+    let (mut n, mut sum) = (0_u64, 0_u64);
+    for (a, b) in gpu_colors.into_iter().zip(cpu_colors) {
+        let (Some(a), Some(b)) = (a, b) else { continue };
+        n += 3;
+        sum += a.iter().zip(b).map(|(a, b)| u64::from(a.abs_diff(b))).sum::<u64>();
+    }
+    assert!(n > 30_000, "{n} values of sky");
+    let gray_levels = sum as f64 / n as f64;
+    assert!(gray_levels < 0.25, "{gray_levels:.2} gray levels");
 }
 
 #[test]

@@ -2,6 +2,7 @@
 //! and `Adapters::Hardware` never selects a software device.
 
 use crate::common::{episode, gpu, views};
+use chaic_core::capability::Eyesight;
 use chaic_core::geom::Camera;
 use chaic_core::{EntityId, Quat, Vec3};
 use chaic_render::{Channels, View};
@@ -113,6 +114,10 @@ fn invalid_batches_give_errors() {
         .render(&[(id, sized(chaic_render::MAX_SIDE_PX + 1, 8))])
         .expect_err("the views are too large");
     assert!(matches!(large, GpuError::TooLargeBatch { max: 0, .. }), "{large}");
+    let sight = Eyesight { range_m: 2.0, blur_rad: 0.0, field_rad: 3.0, lowered_rad: 0.0 };
+    let limited = View { sight: Some(sight), ..view };
+    let limited = gpu.render(&[(id, view), (id, limited)]).expect_err("sight cannot be limited");
+    assert!(matches!(limited, GpuError::LimitedSight { index: 1 }), "{limited}");
     gpu.remove(id).expect("the world is on the device");
     assert!(matches!(gpu.render(&[(id, view)]), Err(GpuError::UnknownWorld(_))));
     assert!(matches!(gpu.update(id, &scene, &world), Err(GpuError::UnknownWorld(_))));

@@ -1,8 +1,8 @@
 //! Promise: depth and ids match the geometry, color does not affect them, nothing depends on
 //! threads, and no camera breaks the renderer.
 
-use chaic_core::capability::Persona;
-use chaic_core::geom::Camera;
+use chaic_core::capability::{Eyesight, Persona};
+use chaic_core::geom::{Camera, Rect};
 use chaic_core::observation::Images;
 use chaic_core::{AgentId, ClassId, EntityId, Vec3};
 use chaic_render::{
@@ -206,6 +206,27 @@ fn labels_match_images() {
 }
 
 #[test]
+fn labels_end_at_the_limits_of_sight() {
+    let world = world(wall_ahead());
+    let scene = Scene::new(world.setup());
+    let sight =
+        Eyesight { range_m: 2.0, blur_rad: 0.0, field_rad: std::f32::consts::PI, lowered_rad: 0.0 };
+    let complete = view(camera([0.0, 1.6, 0.0], 0.0, 0.0, 64, 48));
+    assert!(scene.label(&world, &complete).ids.contains(&EntityId::WALL.0));
+    let view = View { sight: Some(sight), ..complete };
+    let images = scene.render(&world, &[view]).pop().expect("one image per view");
+    let labels = scene.label(&world, &view);
+    assert_eq!(Some(&labels.ids), images.ids.as_ref());
+    let mm = images.depth_m.iter().flatten().map(|d| chaic_render::depth_mm(*d));
+    assert!(mm.eq(labels.depth_mm.iter().copied()));
+    assert!(labels.ids.contains(&EntityId::FLOOR.0) && !labels.ids.contains(&EntityId::WALL.0));
+    let normals = labels.normals.as_chunks::<3>().0;
+    for (id, normal) in labels.ids.iter().zip(normals) {
+        assert_eq!(*id == EntityId::NOTHING.0, *normal == [0.0; 3], "{id} {normal:?}");
+    }
+}
+
+#[test]
 fn round_objects_have_smooth_normals() {
     let mut setup = empty();
     let apple = object("apple", 0.0, -0.6, 0.0);
@@ -341,6 +362,28 @@ fn a_plan_shows_walls_people_and_a_legend() {
     let teal = map.pixels().filter(|p| p.0 == [16, 136, 140]).count();
     assert!(teal > 20, "the helper's marker: {teal}");
     assert!(image_out::ids_view(&[0; 4], 2, 2).is_some());
+}
+
+#[test]
+fn a_plan_of_a_deep_place_shows_both_ends() {
+    // 1.6 m by 100.6 m with the margin: 200 pixels wide, the map would be 12,575 pixels high.
+    let mut setup = empty();
+    setup.bounds = Rect::new([-0.5, -50.0], [0.5, 50.0]);
+    setup.people = [-49.0, 49.0].map(|z| scenes::person(Persona::Adult, 0.0, z, 0.0)).to_vec();
+    let world = world(setup);
+    let map = floor_plan::draw(&world, 200);
+    assert_eq!(map.width(), 130);
+    let map_height_px = (130.0 * floor_plan::relative_height(&world)) as u32;
+    assert!((8000..=MAX_SIDE_PX).contains(&map_height_px), "{map_height_px} pixels");
+    let has_color = |color: [u8; 3], rows: std::ops::Range<u32>| {
+        let mut pixels = map.enumerate_pixels().filter(|(_, y, _)| rows.contains(y));
+        pixels.any(|(_, _, pixel)| pixel.0 == color)
+    };
+    assert!(has_color([208, 64, 40], 0..200), "the partner at one end");
+    assert!(
+        has_color([16, 136, 140], map_height_px - 200..map_height_px),
+        "the helper at the other"
+    );
 }
 
 #[test]

@@ -7,7 +7,7 @@ use chaic_world::{Block, ObjectSpec, Rules, Setup, Surface, blocks_of, top_surfa
 use super::{Problem, Strictness, TOLERANCE_M, object_field};
 use crate::upright_box::{UprightBox, plan_bounds};
 
-/// Minimum distance from walls at which people start indoors, meters (paper, "Task Generation").
+/// Minimum distance from walls at which people start, meters (paper, "Task Generation").
 const START_CLEARANCE_M: f32 = 0.5;
 
 /// Maximum height of an object's bottom above its support, meters, for objects that lean on their
@@ -141,7 +141,7 @@ fn check_starts(
         };
         let walls = walls.iter().filter(|w| w.spans(stands));
         let wall_m = walls.map(|w| w.distance(p)).fold(f32::MAX, f32::min);
-        if setup.ceiling_m.is_some() && wall_m < clearance_m - TOLERANCE_M {
+        if wall_m < clearance_m - TOLERANCE_M {
             let problem =
                 format!("is {wall_m:.2} m from a wall, expected at least {clearance_m} m");
             found.push(Problem::new(&field, problem));

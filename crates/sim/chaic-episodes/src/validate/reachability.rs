@@ -191,7 +191,10 @@ fn is_reachable(
     object: &ObjectSpec,
     walls: &[UprightBox],
 ) -> bool {
-    cells_beside(grid, reach_m, object, walls).into_iter().any(|i| reached[i])
+    let is_beside = |part: &UprightBox| {
+        cells_beside_part(grid, reach_m, part, walls, |i| reached[i]).next().is_some()
+    };
+    UprightBox::from_object(object).iter().any(is_beside)
 }
 
 /// Returns the free cells from which an object is within reach without a wall in between.
@@ -202,14 +205,35 @@ fn cells_beside(
     walls: &[UprightBox],
 ) -> Vec<usize> {
     let parts = UprightBox::from_object(object);
-    let is_beside = |part: &UprightBox, i: &usize| {
+    parts
+        .iter()
+        .flat_map(move |part| cells_beside_part(grid, reach_m, part, walls, move |i| grid.free[i]))
+        .collect()
+}
+
+/// Returns the cells with `is_candidate` from which a part of an object is within reach without a wall
+/// in between.
+///
+/// Walls are searched last, and only those near the part: files may have thousands of large objects
+/// and of walls.
+fn cells_beside_part(
+    grid: &FreeSpace,
+    reach_m: f32,
+    part: &UprightBox,
+    walls: &[UprightBox],
+    is_candidate: impl Fn(usize) -> bool,
+) -> impl Iterator<Item = usize> {
+    // A line of sight to the part stays in this area, apart from rounding.
+    let area = part.bounds().expanded(reach_m);
+    let with_margin = area.expanded(CELL_M);
+    let near_walls: Vec<UprightBox> =
+        walls.iter().filter(|w| w.bounds().overlaps(&with_margin)).copied().collect();
+    grid.cells_in(area).filter(move |i| {
         let from = grid.middle(*i);
-        part.distance(from) <= reach_m && is_visible(from, part.nearest(from), walls)
-    };
-    let near = |part: &UprightBox| {
-        grid.cells_in(part.bounds().expanded(reach_m)).filter(|i| grid.free[*i])
-    };
-    parts.iter().flat_map(|part| near(part).filter(|i| is_beside(part, i))).collect()
+        is_candidate(*i)
+            && part.distance(from) <= reach_m
+            && is_visible(from, part.nearest(from), &near_walls)
+    })
 }
 
 fn is_visible(from: Vec2, to: Vec2, walls: &[UprightBox]) -> bool {

@@ -95,6 +95,12 @@ fn errors_name_the_field() {
     };
     check(without, &["setup", "walls"]);
     check(|f| f["id"] = json!("a b\n"), &["id"]);
+    for name in ["street", "a\nb"] {
+        check(
+            |f| f["generator"]["name"] = json!(name),
+            &[&format!("generator.name: is {name:?}, expected \"house\"")],
+        );
+    }
 }
 
 #[test]
@@ -177,6 +183,45 @@ fn intersecting_and_unsupported_objects_are_refused() {
         f["setup"]["things"][k]["position"][1] = json!(2.5);
     };
     check(in_mid_air, &["(plate).position[1]", "nothing supports it"]);
+}
+
+#[test]
+fn nobody_starts_in_a_wall_outdoors() {
+    let mut file = bundled("moving_house/test/00");
+    file["generator"] = Value::Null;
+    let at = file["setup"]["people"][0]["pose"]["position"].clone();
+    let x_m = at[0].as_f64().expect("a number");
+    // A thin post: it reaches no furniture, which is at least 0.45 m away.
+    let wall = |x_m: f64| {
+        json!([{"a": [x_m, at[2]], "b": [x_m, at[2]], "thickness_m": 0.05, "bottom_m": 0.0,
+                "top_m": 2.0, "color": [200, 200, 200]}])
+    };
+    file["setup"]["walls"] = wall(x_m + 0.3);
+    assert!(Episode::parse(file.to_string().as_bytes(), "x").is_ok(), "it is beside the post");
+    file["setup"]["walls"] = wall(x_m);
+    check_file(&file, &["people[0].pose.position: is 0.00 m from a wall, expected at least 0.2 m"]);
+}
+
+#[test]
+fn thousands_of_large_objects_and_walls_are_checked_in_time() {
+    let mut file = bundled("no_constraint/test/00");
+    file["generator"] = Value::Null;
+    let setup = &mut file["setup"];
+    setup["bounds"] = json!({"min": [-30.0, -30.0], "max": [30.0, 30.0]});
+    // Flat obstacles over each other, out of reach, and walls far from them.
+    let wall = |k: usize| {
+        let (x_m, z_m) = (20.0 + (k % 64) as f64 * 0.1, 20.0 + (k / 64) as f64 * 0.2);
+        json!({"a": [x_m, z_m], "b": [x_m + 0.05, z_m], "thickness_m": 0.02, "bottom_m": 0.0,
+               "top_m": 2.0, "color": [200, 200, 200]})
+    };
+    let obstacle = json!({"class": "trashbin", "position": [-22.0, 0.0, -22.0], "yaw_rad": 0.0,
+                          "scale": [30.0, 0.01, 30.0], "variant": 0, "fixed": false});
+    setup["walls"].as_array_mut().expect("walls are a list").extend((0..1500).map(wall));
+    let things = setup["things"].as_array_mut().expect("things are a list");
+    things.extend(std::iter::repeat_n(obstacle, 1000));
+    let start = std::time::Instant::now();
+    Episode::parse(file.to_string().as_bytes(), "x").expect("it can be played");
+    assert!(start.elapsed().as_secs() < 60, "{:?}", start.elapsed());
 }
 
 #[test]

@@ -250,6 +250,7 @@ fn expect_error(spoil: impl FnOnce(&Sample), words: &[&str]) {
     for word in words {
         assert!(error.contains(word), "`{word}` is not in: {error}");
     }
+    assert!(!error.contains('\n'), "{error}");
 }
 
 #[test]
@@ -304,6 +305,9 @@ fn nan_and_too_large_numbers_are_refused_with_the_field() {
     expect_error(|s| s.edit(METADATA, high), &["metadata.json", "object_height[0]", "too large"]);
     let start = |v: &mut Value| v["agent"]["0"]["z"] = json!(1e39);
     expect_error(|s| s.edit(METADATA, start), &["metadata.json", "agent.0", "expected a position"]);
+    let sum =
+        |v: &mut Value| v[0]["task"]["goal_task"] = json!([["apple", u32::MAX], ["apple", 1]]);
+    expect_error(|s| s.edit(LIST, sum), &["1a_0_0.json", "goal.targets[0]", "4294967295 of apple"]);
     let many = |v: &mut Value| v[0]["task"]["goal_task"][0][1] = json!(-1);
     expect_error(|s| s.edit(LIST, many), &["test_env.json", "[0].task.goal_task[0][1]", "invalid"]);
     // Python writes NaN, which is not JSON.
@@ -312,8 +316,31 @@ fn nan_and_too_large_numbers_are_refused_with_the_field() {
             let text = fs::read_to_string(s.path().join(LAYOUTS)).unwrap();
             s.write(LAYOUTS, &text.replacen("\"x\":-5.0", "\"x\": NaN", 1));
         },
-        &["floorplan_layouts.json", "1.0[0].position.x", "null"],
+        &["floorplan_layouts.json", "1.0[0].position.x", "NaN"],
     );
+    for number in ["NaN", "-Infinity"] {
+        expect_error(
+            |s| replace(s, METADATA, "\"object_height\":[0.73", number),
+            &["metadata.json", "object_height[0]", "NaN or infinity"],
+        );
+    }
+}
+
+/// Replaces the number at the end of a part of a file.
+fn replace(sample: &Sample, file: &str, part: &str, number: &str) {
+    let text = fs::read_to_string(sample.path().join(file)).expect("the sample has it");
+    let begin = part.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.');
+    let changed = text.replacen(part, &format!("{begin}{number}"), 1);
+    assert_ne!(changed, text, "{part}");
+    sample.write(file, &changed);
+}
+
+#[test]
+fn nan_where_nothing_is_read_is_no_error() {
+    let sample = Sample::new();
+    sample.edit(METADATA, |v| v["mass_map"] = json!({"a: NaN": [1.25]}));
+    replace(&sample, METADATA, "[1.25", "NaN, -Infinity");
+    assert_eq!(sample.episode(), Sample::new().episode());
 }
 
 #[test]

@@ -122,8 +122,8 @@ impl EnvBatch {
     /// later counts.
     ///
     /// # Errors
-    /// Those of [`Env::reset`], and [`EnvError::Batch`] if the batch has no such environment; no
-    /// environment is reset then.
+    /// [`EnvError::Batch`] if the batch has no such environment; no environment is reset then. Those of
+    /// [`Env::reset`]; other environments may be reset then.
     pub fn reset_many(&mut self, work: Vec<(usize, EpisodeConfig<'_>)>) -> Result<()> {
         let n = self.envs.len();
         let mut configs: Vec<Option<EpisodeConfig<'_>>> = (0..n).map(|_| None).collect();
@@ -212,7 +212,10 @@ impl EnvBatch {
     fn split<'a>(&'a mut self, images: ImagesMut<'a>) -> Result<Vec<EnvWork<'a>>> {
         self.layout.check(&images)?;
         let n = self.layout.pixels();
-        let ImagesMut { mut rgb, mut depth_m, mut ids } = images;
+        // An absent kind of image may have an empty buffer.
+        let mut rgb = images.rgb.filter(|_| self.layout.rgb);
+        let mut depth_m = images.depth_m.filter(|_| self.layout.depth);
+        let mut ids = images.ids.filter(|_| self.layout.ids);
         let mut remaining = &self.slots[..];
         let mut work = Vec::with_capacity(self.envs.len());
         for env in &mut self.envs {

@@ -100,7 +100,17 @@ impl Turn {
         if let Some(ids) = self.rendered.take().and_then(|rendered| rendered.hidden_ids) {
             self.spare_ids = ids;
         }
+        // The agent may have decided without an observation.
+        self.frame_history.clear();
         self.choice.take()
+    }
+
+    /// Discards the rendered observation, but not its frame history; its images may lie in buffers of
+    /// a caller that have changed since.
+    fn discard_images(&mut self) {
+        if let Some(rendered) = self.rendered.take() {
+            self.frame_history = rendered.observation.frame_history.into();
+        }
     }
 }
 
@@ -366,6 +376,7 @@ impl Env {
         self.slots = fork(&snapshot.slots)?;
         self.world = snapshot.world.clone();
         self.turns.clone_from(&snapshot.turns);
+        self.turns.iter_mut().for_each(Turn::discard_images);
         self.failure = check_sensors(&self.slots);
         Ok(())
     }

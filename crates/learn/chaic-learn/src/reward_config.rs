@@ -53,12 +53,18 @@ impl From<CumulativeTable> for RewardWeights {
 
 /// `[rewards]`: weights of a reward per action, for visual policies.
 #[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 struct ActionTable {
     delivered: f64,
     #[serde(alias = "approached_per_m")]
     progress_per_m: f64,
     invalid: f64,
+}
+
+impl Default for ActionTable {
+    fn default() -> ActionTable {
+        RewardWeights::STANDARD.into()
+    }
 }
 
 impl From<RewardWeights> for ActionTable {

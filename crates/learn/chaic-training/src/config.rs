@@ -92,10 +92,46 @@ pub fn parse_config<T: Trainer>(text: &str) -> Result<T::Config, String> {
     // Bounds come first: the parser would refuse -1 without naming key and bounds.
     let table: Table = parse(text)?;
     bounds::check(&table, T::BOUNDS)?;
-    let config = parse(text)?;
+    let config = with_nested_defaults::<T>(table, parse(text)?);
     // The table may hold aliases, which have no bounds; the parsed configuration holds current keys.
     check_config::<T>(&config)?;
     Ok(config)
+}
+
+/// Gives the missing keys of inner tables the defaults of this training. Those of the table's own type
+/// may differ: `[ppo]` alone has the defaults of Stable-Baselines3. `config` is the parsed `table`.
+fn with_nested_defaults<T: Trainer>(mut table: Table, mut config: T::Config) -> T::Config {
+    let defaults = Table::try_from(T::Config::default()).expect("defaults serialize to TOML");
+    for missing in missing_values(&table, &defaults) {
+        let mut extended = table.clone();
+        merge(&mut extended, missing);
+        // A key that is set under its old name is refused as a duplicate, and keeps its value.
+        if let Ok(extended_config) = extended.clone().try_into::<T::Config>() {
+            (table, config) = (extended, extended_config);
+        }
+    }
+    config
+}
+
+/// Returns the defaults that are missing in the inner tables of `table`, each in a table of its own.
+fn missing_values(table: &Table, defaults: &Table) -> Vec<Table> {
+    let mut missing = Vec::new();
+    for (key, default) in defaults {
+        let (Some(toml::Value::Table(inner)), toml::Value::Table(default)) =
+            (table.get(key), default)
+        else {
+            continue;
+        };
+        let mut of_inner = missing_values(inner, default);
+        for (name, value) in default {
+            if !inner.contains_key(name) {
+                of_inner.push(Table::from_iter([(name.clone(), value.clone())]));
+            }
+        }
+        let nested = |one: Table| Table::from_iter([(key.clone(), toml::Value::Table(one))]);
+        missing.extend(of_inner.into_iter().map(nested));
+    }
+    missing
 }
 
 /// Checks a configuration that was not read from a file.
@@ -132,6 +168,18 @@ fn parse<R: DeserializeOwned>(text: &str) -> Result<R, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn missing_values_are_those_of_present_inner_tables() {
+        let table: Table = toml::from_str("x = 1\n[a]\nb = 2\n[a.c]\nd = 3\n").unwrap();
+        let defaults = "x = 0\ny = 0\n[a]\nb = 0\ne = 5\n[a.c]\nd = 0\nf = 6\n[g]\nh = 7\n";
+        let mut merged = table.clone();
+        let missing = missing_values(&table, &toml::from_str(defaults).unwrap());
+        assert_eq!(missing.len(), 2);
+        missing.into_iter().for_each(|one| merge(&mut merged, one));
+        let expected = "x = 1\n[a]\nb = 2\ne = 5\n[a.c]\nd = 3\nf = 6\n";
+        assert_eq!(merged, toml::from_str(expected).unwrap());
+    }
 
     #[test]
     fn assignments_are_toml_or_text_and_merge_into_tables() {

@@ -312,10 +312,13 @@ impl<T: Trainer> TrainingRun<T> {
         let validated = self.trainer.validate(stop).map_err(not_finite)?;
         let Some((metrics, weights)) = validated else { return Ok(false) };
         let score = T::SCORE.and_then(|name| metrics.get(name).copied());
-        self.record(&CurveRecord { phase: Phase::Validation, step, metrics }, report)?;
         let is_best = score.is_none_or(|score| self.best_score.is_none_or(|best| score > best));
         if is_best {
             write_atomically(&self.folder.join(T::WEIGHTS), &weights)?;
+        }
+        // Resuming takes the last line as proof of its validation, so the weights come first.
+        self.record(&CurveRecord { phase: Phase::Validation, step, metrics }, report)?;
+        if is_best {
             self.best_score = score;
         }
         self.validation_is_due = false;
@@ -368,9 +371,13 @@ fn start_locked<T: Trainer>(
     progress: &mut dyn FnMut(&str),
     stop: &AtomicBool,
 ) -> Result<Option<T>, TrainingError> {
-    if let Some(weights) = &weights {
+    let initial = folder.join(INITIAL_WEIGHTS);
+    match &weights {
         // A training that is stopped before its first checkpoint resumes from this copy.
-        write_atomically(&folder.join(INITIAL_WEIGHTS), &weights.bytes)?;
+        Some(weights) => write_atomically(&initial, &weights.bytes)?,
+        // A training that was killed before it started may have left one.
+        None if fs::symlink_metadata(&initial).is_ok() => remove_file(&initial)?,
+        None => {}
     }
     // This file makes the folder a training, so it is written last.
     write_atomically(&folder.join(CONFIG), config_text::<T>(config).as_bytes())?;

@@ -334,8 +334,11 @@ fn a_training_that_is_cut_short_has_the_weights_of_its_last_step() {
     fs::write(&path, config.replace("steps = 24", &format!("steps = {n_done}"))).unwrap();
     let mut run = resume(dir.path()).unwrap();
     assert_eq!(run.progress(), (n_done, n_done));
-    assert!(run_to_end(&mut run, &mut |_, _| ()));
-    assert!(dir.path().join(Toy::<false>::WEIGHTS).exists());
+    // A process that is killed after this line does not validate again.
+    assert!(run_to_end(&mut run, &mut |record, _| {
+        assert_eq!(record.phase, Phase::Validation);
+        assert!(dir.path().join(Toy::<false>::WEIGHTS).exists());
+    }));
     let curves = fs::read_to_string(dir.path().join(CURVES)).unwrap();
     assert!(curves.contains(&format!("\"validation\",\"step\":{n_done}")), "{curves}");
 }
@@ -409,6 +412,15 @@ fn a_training_that_is_stopped_before_its_first_step_keeps_its_initial_weights() 
     let random = dir.path().join("random");
     assert!(run_to_end(&mut start(&random, &ToyConfig::default()), &mut |_, _| ()));
     assert!(ends[0] != final_files(&random), "the initial weights have an effect");
+    // A start that was killed before it wrote the configuration left its weights.
+    let left = dir.path().join("left");
+    fs::create_dir(&left).unwrap();
+    fs::copy(&path, left.join(INITIAL_WEIGHTS)).unwrap();
+    let (config, stop) = (ToyConfig::default(), AtomicBool::new(true));
+    let started = TrainingRun::<Toy>::start(&left, &config, None, &mut |_| (), &stop);
+    assert!(started.unwrap().is_none());
+    assert!(run_to_end(&mut resume(&left).unwrap(), &mut |_, _| ()));
+    assert!(final_files(&left) == final_files(&random));
 }
 
 #[test]

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use chaic_core::action::Hand;
-use chaic_core::observation::{Grants, SensorConfig};
+use chaic_core::observation::{FrameHistorySpec, Grants, SensorConfig};
 use chaic_core::rng::RngStream;
 use chaic_core::{Action, AgentId, EntityId, Target, TaskId};
 use chaic_env::{
@@ -169,6 +169,70 @@ fn one_pass_observes_each_turn_once() {
     assert!(first.iter().all(|depth| *depth >= 0.0), "a new turn");
     assert!(second.iter().all(|depth| *depth == -1.0), "the same turn");
     assert!(batch.observation(1).is_some());
+}
+
+/// The caller's buffers show another state by then.
+#[test]
+fn a_restored_turn_is_observed_again() {
+    let bundled = bundled();
+    let mut batch = EnvBatch::new(vec![env(&bundled, 0, Grants::IDS, ALL)]).unwrap();
+    let mut buffers = Buffers::new(batch.layout());
+    Passes::One.run(&mut batch, &mut buffers);
+    let snapshot = batch.envs()[0].snapshot().unwrap();
+    let start = buffers.depth_m.clone();
+    assert!(batch.submit(0, Action::TurnLeft));
+    Passes::One.run(&mut batch, &mut buffers);
+    buffers.depth_m.fill(-1.0);
+    batch.restore(0, &snapshot).unwrap();
+    assert_eq!(Passes::One.run(&mut batch, &mut buffers), [0]);
+    assert!(buffers.depth_m == start);
+    let mut alone = env(&bundled, 0, Grants::IDS, ALL);
+    alone.restore(&snapshot).unwrap();
+    let images = &alone.observe(AgentId::HELPER).unwrap().images;
+    assert!(images.depth_m.as_ref() == Some(&start));
+}
+
+#[test]
+fn a_frame_history_begins_after_the_last_decision() {
+    let bundled = bundled();
+    let spec = FrameHistorySpec { image_size: SIZE, every_frames: 1, max_len: 256 };
+    let sensors = SensorConfig { frame_history: Some(spec), ..ALL };
+    let envs = (0..2).map(|n| env(&bundled, n, Grants::IDS, sensors)).collect();
+    let mut batch = EnvBatch::new(envs).unwrap();
+    let mut buffers = Buffers::new(batch.layout());
+    let frame = |batch: &EnvBatch| batch.envs()[1].world().state().frame;
+    let history = |batch: &EnvBatch| -> Vec<u32> {
+        let observation = batch.observation(1).expect("the agent was observed");
+        observation.frame_history.iter().map(|taken| taken.frame).collect()
+    };
+    let mut before = 0;
+    for _ in 0..2 {
+        // Without an observation.
+        batch.advance(None);
+        before = frame(&batch);
+        assert!(batch.submit(0, Action::TurnLeft) && batch.submit(1, Action::TurnLeft));
+    }
+    Passes::Two.run(&mut batch, &mut buffers);
+    let expected: Vec<u32> = (before + 1..=frame(&batch)).collect();
+    assert!(before > 0 && !expected.is_empty());
+    assert_eq!(history(&batch), expected);
+    // A repeated observation has the same history.
+    assert!(batch.submit(0, Action::TurnLeft));
+    Passes::Two.run(&mut batch, &mut buffers);
+    assert_eq!(history(&batch), expected);
+}
+
+#[test]
+fn absent_images_may_have_an_empty_buffer() {
+    let bundled = bundled();
+    let mut batch = EnvBatch::new(vec![env(&bundled, 0, Grants::NONE, ALL)]).unwrap();
+    let mut buffers = Buffers::new(batch.layout());
+    assert!(buffers.ids.is_empty(), "ids are not granted");
+    for passes in [Passes::One, Passes::Two] {
+        assert_eq!(passes.run(&mut batch, &mut buffers), [0]);
+        assert!(buffers.depth_m.iter().all(|depth| *depth >= 0.0));
+        buffers.depth_m.fill(-1.0);
+    }
 }
 
 #[test]

@@ -180,6 +180,24 @@ fn damaged_checkpoints_and_values_out_of_bounds_are_refused() {
 }
 
 #[test]
+fn missing_keys_of_inner_tables_have_the_defaults_of_the_training() {
+    let ppo = parse_config::<PolicyTrainer<PpoTrainingConfig>>;
+    let mut expected = PpoTrainingConfig::default();
+    expected.ppo.kl_coef = 0.5;
+    assert_eq!(ppo("[ppo]\nkl_coef = 0.5"), Ok(expected));
+    let mut expected = PpoTrainingConfig::default();
+    (expected.ppo.gamma, expected.ppo.adam.beta1) = (0.5, 0.25);
+    assert_eq!(ppo("[ppo]\ndiscount = 0.5\n[ppo.adam]\nbeta1 = 0.25"), Ok(expected));
+    let mut expected = CloningConfig::default();
+    expected.adam.beta1 = 0.25;
+    assert_eq!(parse_config::<PolicyTrainer<CloningConfig>>("[adam]\nbeta1 = 0.25"), Ok(expected));
+    let mut expected = VisualConfig::default();
+    (expected.ppo.n_epochs, expected.rewards.delivered) = (4, 5.0);
+    let visual = parse_config::<VisualTrainer>("[ppo]\nn_epochs = 4\n[rewards]\ndelivered = 5.0");
+    assert_eq!(visual, Ok(expected));
+}
+
+#[test]
 fn configurations_that_exceed_memory_are_refused_by_key() {
     for (text, names) in [
         ("n_envs = 1024\nimage_size = 512", ["n_envs", "image_size"]),

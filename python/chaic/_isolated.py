@@ -37,6 +37,7 @@ def command_line(maker: Callable[[], Any], images: Sequence[str], image_size: in
         raise ValueError(_UNREACHABLE)
     task = {
         "main": main_file,
+        "package": getattr(sys.modules["__main__"], "__package__", None),
         "maker": base64.b64encode(pickled).decode(),
         "images": list(images),
         "image_size": image_size,
@@ -84,7 +85,8 @@ def readable(maker: Callable[[], Any]) -> list[str]:
     module = sys.modules.get(getattr(without_partial(maker), "__module__", None) or "")
     file = getattr(module, "__file__", None) or _main_file()
     if file is not None:
-        package = "." in module.__name__ if module is not None else False
+        is_main = module is None or module.__name__ == "__main__"
+        package = bool(getattr(sys.modules["__main__"], "__package__", None)) if is_main else "." in module.__name__
         path = Path(file).absolute()
         found.add(str(path.parent if package and not is_too_wide(path.parent) else path))
     main_file = _main_file()
@@ -114,6 +116,8 @@ def _maker(task: dict[str, Any]) -> Any:
         # As in multiprocessing, the script runs under another name, so its main part is skipped.
         script = types.ModuleType("__mp_main__")
         script.__file__ = task["main"]
+        # For relative imports of a script that was started by `python -m`.
+        script.__package__ = task.get("package")
         # The bytes may declare their encoding.
         code = compile(Path(task["main"]).read_bytes(), task["main"], "exec")
         sys.modules["__main__"] = sys.modules["__mp_main__"] = script

@@ -89,6 +89,7 @@ class HelperEnv(gymnasium.Env[Any, Any]):
         self.weights = reward_weights(reward)
         self.source = EpisodeSource(task, split)
         images = spaces.image_parts(self.parts)
+        grants = (grants,) if isinstance(grants, str) else tuple(grants)
         self._planner: Planner | None = None
         if self._uses_plans or "map" in self.parts:
             self._planner = Planner(perception, image_size, rules=rules, set=list(set))

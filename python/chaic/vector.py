@@ -76,7 +76,7 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
         self._options: dict[str, Any] = {
             "images": spaces.image_parts(self.parts),
             "image_size": image_size,
-            "grants": list(grants),
+            "grants": grants if isinstance(grants, str) else list(grants),
             "rules": rules,
             "set": list(set),
             "appearance": appearance,

@@ -64,7 +64,7 @@ class _Pair:
             "partner": "caller",
             "images": spaces.image_parts(self.parts),
             "image_size": image_size,
-            "grants": list(grants),
+            "grants": grants if isinstance(grants, str) else list(grants),
             "rules": rules,
             "set": list(set),
             "appearance": appearance,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import math
 import os
@@ -12,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import chaic
-from chaic._isolated import readable
+from chaic._isolated import _maker, readable
 
 OPTIONS = {"tasks": "low_target", "split": "train", "n_episodes": 1, "jobs": 2, "quiet": True}
 
@@ -150,3 +151,18 @@ def test_a_helper_that_cannot_be_imported_is_refused(tmp_path, helpers):
         with pytest.raises(ValueError, match="exec-read .*nowhere: "):
             chaic.evaluate(helpers.Turner, isolate=True, read=read, out=tmp_path / "run", **OPTIONS)
     assert not (tmp_path / "run").exists()
+
+
+def test_the_script_of_a_package_can_import_its_neighbors(tmp_path, monkeypatch):
+    package = tmp_path / "isolated_package"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    (package / "neighbor.py").write_text("class Mine: pass\n")
+    (package / "main.py").write_text("from .neighbor import Mine\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setitem(sys.modules, "__main__", sys.modules["__main__"])
+    monkeypatch.setitem(sys.modules, "__mp_main__", sys.modules["__main__"])
+    # Protocol 0 names the class in text.
+    pickled = b"c__main__\nMine\n."
+    task = {"main": str(package / "main.py"), "package": "isolated_package", "maker": base64.b64encode(pickled).decode()}
+    assert _maker(task).__name__ == "Mine"

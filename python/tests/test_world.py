@@ -334,3 +334,23 @@ def test_old_names_warn_or_name_the_new_one(episode):
     ]:
         with pytest.raises(AttributeError, match=new):
             getattr(instance, old)
+
+
+def test_numbers_out_of_range_raise_value_errors(episode, tmp_path):
+    with pytest.raises(ValueError, match="seed is -1, expected 0 to 4294967295"):
+        chaic.World(episode, -1)
+    with pytest.raises(ValueError, match="seed is 4294967296"):
+        chaic.World(episode).reset(seed=2**32)
+    with pytest.raises(ValueError, match=r"seeds is \[-1\]"):
+        chaic.Batch([episode], [-1])
+    with pytest.raises(ValueError, match="agent is -1"):
+        chaic.World(episode).briefing(-1)
+    with pytest.raises(ValueError, match="jobs is -1"):
+        chaic.evaluate(baselines="none", out=tmp_path / "run", jobs=-1, quiet=True)
+
+
+def test_one_grant_may_be_a_string(episode):
+    world = chaic.World(episode, grants="ids", images="ids", image_size=32)
+    assert world.briefing().grants["ids"]
+    with pytest.raises(ValueError, match='unknown grant "idz"'):
+        chaic.World(episode, grants="idz")

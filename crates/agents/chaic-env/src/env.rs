@@ -42,6 +42,8 @@ pub struct Env {
     spare_images: Vec<Images>,
     /// Error of an agent; no agent is asked again after it.
     failure: Option<AgentError>,
+    /// True if a sink has received the record of the end.
+    has_recorded_end: bool,
 }
 
 /// Copy of a running episode with its agents; see [`Env::snapshot`].
@@ -53,6 +55,7 @@ pub struct EnvSnapshot {
     turns: Vec<Turn>,
     header: Header,
     supplied: SuppliedSlots,
+    has_recorded_end: bool,
 }
 
 /// Slots that the caller supplied; the others hold the default rule-based agents of the episode.
@@ -160,7 +163,17 @@ impl Env {
         let renderer = ObservationRenderer::new(Arc::new(scene));
         let turns = (0..slots.len()).map(|k| Turn::new(AgentId(k as u8))).collect();
         let failure = check_sensors(&slots);
-        Env { world, slots, supplied, renderer, header, turns, spare_images: Vec::new(), failure }
+        Env {
+            world,
+            slots,
+            supplied,
+            renderer,
+            header,
+            turns,
+            spare_images: Vec::new(),
+            failure,
+            has_recorded_end: false,
+        }
     }
 
     /// Starts another episode with the agents that the caller supplied, and with its own rule-based
@@ -226,6 +239,9 @@ impl Env {
     }
 
     /// Returns the briefing of an agent.
+    ///
+    /// # Panics
+    /// If the episode has no such agent.
     pub fn briefing(&self, agent: AgentId) -> Briefing {
         let grants = self.slots[agent.index()].grants;
         self.world.briefing(agent, grants, self.header.seed)
@@ -262,6 +278,9 @@ impl Env {
     ///
     /// It is for learners that need color at few observations. Their sensors have none, so the other
     /// observations are drawn without it.
+    ///
+    /// # Panics
+    /// If the episode has no such agent.
     pub fn render_color(&self, agent: AgentId) -> Vec<u8> {
         let image_size = self.slots[agent.index()].sensors.image_size;
         self.renderer.render_color(&self.world, agent, image_size)
@@ -352,6 +371,7 @@ impl Env {
             turns: self.turns.clone(),
             header: self.header.clone(),
             supplied: self.supplied,
+            has_recorded_end: self.has_recorded_end,
         })
     }
 
@@ -375,6 +395,7 @@ impl Env {
         }
         self.slots = fork(&snapshot.slots)?;
         self.world = snapshot.world.clone();
+        self.has_recorded_end = snapshot.has_recorded_end;
         self.turns.clone_from(&snapshot.turns);
         self.turns.iter_mut().for_each(Turn::discard_images);
         self.failure = check_sensors(&self.slots);
@@ -395,7 +416,7 @@ impl Env {
     /// Runs the episode until an external agent needs an action, the episode ends, or an agent waits in
     /// a frame at or after `until`.
     ///
-    /// Passes every record to `sink`.
+    /// Passes every record to `sink`, and the record of the end only once.
     ///
     /// # Errors
     /// The first error of `sink` or of an agent.
@@ -419,7 +440,7 @@ impl Env {
             }
             self.run_frames(sink)?;
         }
-        sink(&Record::End(End::new(&self.world)))?;
+        self.record_end(sink)?;
         Ok(AdvanceOutcome::Ended)
     }
 
@@ -446,8 +467,20 @@ impl Env {
         if !self.world.is_over() {
             return Ok(AdvanceOutcome::Stopped);
         }
-        sink(&Record::End(End::new(&self.world)))?;
+        self.record_end(sink)?;
         Ok(AdvanceOutcome::Ended)
+    }
+
+    /// Passes the record of the end to a sink, once in an episode.
+    fn record_end<E>(
+        &mut self,
+        sink: &mut dyn FnMut(&Record) -> std::result::Result<(), E>,
+    ) -> std::result::Result<(), E> {
+        if !self.has_recorded_end {
+            sink(&Record::End(End::new(&self.world)))?;
+            self.has_recorded_end = true;
+        }
+        Ok(())
     }
 
     fn check_failure<E: From<AgentError>>(&self) -> std::result::Result<(), E> {

@@ -104,7 +104,7 @@ impl Batch {
     fn new(
         py: Python<'_>,
         episodes: Vec<Bound<'_, Episode>>,
-        seeds: Vec<u32>,
+        #[pyo3(from_py_with = crate::error::seeds)] seeds: Vec<u32>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Batch> {
         let options = Options::new(py, options)?;
@@ -145,7 +145,7 @@ impl Batch {
         py: Python<'_>,
         worlds: Vec<usize>,
         episodes: Vec<Bound<'_, Episode>>,
-        seeds: Vec<u32>,
+        #[pyo3(from_py_with = crate::error::seeds)] seeds: Vec<u32>,
     ) -> PyResult<()> {
         if worlds.len() != episodes.len() || worlds.len() != seeds.len() {
             return Err(mistake("worlds, episodes and seeds differ in number"));
@@ -301,7 +301,11 @@ impl Batch {
 
     /// Returns the briefing of an agent of a world.
     #[pyo3(signature = (world, agent=1))]
-    fn briefing(&mut self, world: usize, agent: u8) -> PyResult<Briefing> {
+    fn briefing(
+        &mut self,
+        world: usize,
+        #[pyo3(from_py_with = crate::error::agent_number)] agent: u8,
+    ) -> PyResult<Briefing> {
         let envs = self.envs()?;
         let n = envs.envs().len();
         let env = envs.envs().get(world).ok_or_else(|| no_such("world", world, n))?;

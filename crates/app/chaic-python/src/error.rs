@@ -3,7 +3,9 @@
 use std::fmt::Display;
 
 use chaic_env::EnvError;
-use pyo3::exceptions::{PyAttributeError, PyIndexError, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{
+    PyAttributeError, PyIndexError, PyOverflowError, PyRuntimeError, PyValueError,
+};
 use pyo3::prelude::*;
 
 /// Returns a `ValueError` for invalid arguments.
@@ -14,6 +16,35 @@ pub fn mistake(error: impl Display) -> PyErr {
 /// Returns an `IndexError` for an index `k` of `n` items.
 pub fn no_such(what: &str, k: usize, n: usize) -> PyErr {
     PyIndexError::new_err(format!("there is no {what} {k} of {n}"))
+}
+
+/// Extracts a seed; raises `ValueError` if it is out of range.
+pub fn seed(value: &Bound<'_, PyAny>) -> PyResult<u32> {
+    value.extract().map_err(|error: PyErr| out_of_range(error, "seed", value, u32::MAX.into()))
+}
+
+/// Extracts seeds; raises `ValueError` if one is out of range.
+pub fn seeds(value: &Bound<'_, PyAny>) -> PyResult<Vec<u32>> {
+    value.extract().map_err(|error: PyErr| out_of_range(error, "seeds", value, u32::MAX.into()))
+}
+
+/// Extracts the number of an agent; raises `ValueError` if it is out of range.
+pub fn agent_number(value: &Bound<'_, PyAny>) -> PyResult<u8> {
+    value.extract().map_err(|error: PyErr| out_of_range(error, "agent", value, u8::MAX.into()))
+}
+
+/// Extracts a number of jobs; raises `ValueError` if it is out of range.
+pub fn n_jobs(value: &Bound<'_, PyAny>) -> PyResult<u32> {
+    value.extract().map_err(|error: PyErr| out_of_range(error, "jobs", value, u32::MAX.into()))
+}
+
+/// Replaces an `OverflowError` by a `ValueError` that names the range.
+fn out_of_range(error: PyErr, name: &str, value: &Bound<'_, PyAny>, max: u64) -> PyErr {
+    if error.is_instance_of::<PyOverflowError>(value.py()) {
+        mistake(format!("{name} is {}, expected 0 to {max}", short_repr(value)))
+    } else {
+        error
+    }
 }
 
 /// Returns an `AttributeError` for an unknown attribute of a class. `renamed` lists old names with their new ones.

@@ -205,7 +205,7 @@ pub fn evaluate(
     granted: Vec<String>,
     images: Vec<String>,
     image_size: u32,
-    jobs: usize,
+    #[pyo3(from_py_with = crate::error::n_jobs)] jobs: u32,
     resume: bool,
     shard: Option<&str>,
     isolation: Option<&Bound<'_, PyDict>>,
@@ -265,7 +265,7 @@ pub fn evaluate(
                 }
             }
         };
-        let is_complete = run.play_shard(shard, jobs, &helpers, stop, &mut on_event)?;
+        let is_complete = run.play_shard(shard, jobs as usize, &helpers, stop, &mut on_event)?;
         if !is_complete {
             return Ok(None);
         }

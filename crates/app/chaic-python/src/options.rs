@@ -29,14 +29,31 @@ struct Keywords {
     partner: String,
     rules: String,
     set: Vec<String>,
-    grants: Vec<String>,
-    images: Vec<String>,
+    grants: Names,
+    images: Names,
     image_size: u32,
     #[serde(alias = "minds_image_size")]
     partner_image_size: Option<u32>,
     appearance: String,
     perception: String,
     behavior: String,
+}
+
+/// One name, or several of them.
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "expected a name or a list of names")]
+enum Names {
+    One(String),
+    Several(Vec<String>),
+}
+
+impl Names {
+    fn into_vec(self) -> Vec<String> {
+        match self {
+            Names::One(name) => vec![name],
+            Names::Several(names) => names,
+        }
+    }
 }
 
 impl Default for Keywords {
@@ -46,8 +63,8 @@ impl Default for Keywords {
             partner: helper_registry::RULES.to_owned(),
             rules: RuleSetName::Paper.to_string(),
             set: Vec::new(),
-            grants: Vec::new(),
-            images: vec!["rgb".to_owned(), "depth".to_owned()],
+            grants: Names::Several(Vec::new()),
+            images: Names::Several(vec!["rgb".to_owned(), "depth".to_owned()]),
             image_size: 128,
             partner_image_size: None,
             appearance: "canonical".to_owned(),
@@ -82,8 +99,8 @@ impl Options {
             keywords.map(|k| depythonize(k).map_err(wrong)).transpose()?.unwrap_or_default();
         let options = Options {
             rules: rule_set(&keywords.rules, &keywords.set)?,
-            sensors: sensors(&keywords.images, keywords.image_size)?,
-            grants: grants(&keywords.grants)?,
+            sensors: sensors(&keywords.images.into_vec(), keywords.image_size)?,
+            grants: grants(&keywords.grants.into_vec())?,
             appearance: keywords.appearance.parse().map_err(mistake)?,
             perception: perception(&keywords.perception, &keywords.behavior)?,
             helper: keywords.helper,

@@ -92,7 +92,7 @@ impl World {
     fn new(
         py: Python<'_>,
         episode: &Bound<'_, Episode>,
-        seed: u32,
+        #[pyo3(from_py_with = crate::error::seed)] seed: u32,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<World> {
         let options = Options::new(py, options)?;
@@ -109,7 +109,7 @@ impl World {
         &mut self,
         py: Python<'_>,
         episode: Option<&Bound<'_, Episode>>,
-        seed: u32,
+        #[pyo3(from_py_with = crate::error::seed)] seed: u32,
     ) -> PyResult<()> {
         let episode = episode.map_or_else(|| Arc::clone(&self.episode), |e| Arc::clone(&e.get().0));
         let World { env, options, .. } = self;
@@ -169,14 +169,21 @@ impl World {
 
     /// Returns the briefing of an agent.
     #[pyo3(signature = (agent=1))]
-    fn briefing(&mut self, agent: u8) -> PyResult<Briefing> {
+    fn briefing(
+        &mut self,
+        #[pyo3(from_py_with = crate::error::agent_number)] agent: u8,
+    ) -> PyResult<Briefing> {
         let agent = self.agent(agent)?;
         Ok(Briefing(self.env()?.briefing(agent)))
     }
 
     /// Returns the observation of an agent that needs an action.
     #[pyo3(signature = (agent=1))]
-    fn observe(&mut self, py: Python<'_>, agent: u8) -> PyResult<Observation> {
+    fn observe(
+        &mut self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = crate::error::agent_number)] agent: u8,
+    ) -> PyResult<Observation> {
         let id = self.agent(agent)?;
         let env = self.env()?;
         let observation = detached(py, || env.observe(id).cloned())?;
@@ -186,7 +193,12 @@ impl World {
     /// Sets the next action of an agent that needs one: a string or dictionary as in docs/subprocess-helpers.md, or a
     /// row of kind (`ACTIONS`), column and row of a pixel. It starts once all agents have chosen.
     #[pyo3(signature = (action, agent=1))]
-    fn submit(&mut self, py: Python<'_>, action: &Bound<'_, PyAny>, agent: u8) -> PyResult<()> {
+    fn submit(
+        &mut self,
+        py: Python<'_>,
+        action: &Bound<'_, PyAny>,
+        #[pyo3(from_py_with = crate::error::agent_number)] agent: u8,
+    ) -> PyResult<()> {
         let id = self.agent(agent)?;
         let action = match action.extract::<[i64; 3]>() {
             Ok(row) => action::from_row(row)?,
@@ -206,7 +218,7 @@ impl World {
         &mut self,
         py: Python<'_>,
         action: &Bound<'_, PyAny>,
-        agent: u8,
+        #[pyo3(from_py_with = crate::error::agent_number)] agent: u8,
     ) -> PyResult<(bool, f64, f64, bool)> {
         self.submit(py, action, agent)?;
         let needs_action = self.advance(py, None)? == outcome_name(AdvanceOutcome::NeedsAction);
@@ -225,7 +237,7 @@ impl World {
     fn proprioception<'py>(
         &mut self,
         py: Python<'py>,
-        agent: u8,
+        #[pyo3(from_py_with = crate::error::agent_number)] agent: u8,
     ) -> PyResult<ProprioceptionArrays<'py>> {
         let id = self.agent(agent)?;
         let env = self.env()?;
@@ -241,7 +253,11 @@ impl World {
     /// Returns the reward terms of the last action of an agent: `delivered`, `progress_m`, `is_invalid`; `None` before
     /// the first one.
     #[pyo3(signature = (agent=1))]
-    fn reward<'py>(&mut self, py: Python<'py>, agent: u8) -> PyResult<Bound<'py, PyAny>> {
+    fn reward<'py>(
+        &mut self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = crate::error::agent_number)] agent: u8,
+    ) -> PyResult<Bound<'py, PyAny>> {
         let id = self.agent(agent)?;
         reward(py, self.env()?.reward(id))
     }

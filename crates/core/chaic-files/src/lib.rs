@@ -77,14 +77,15 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     })
 }
 
-/// Writes a new file that only its owner may read, atomically. Other systems than Unix apply the
+/// Writes a new file that only its owner may read, atomically, even if another process writes it too:
+/// each process has a temporary file of its own. Other systems than Unix apply the
 /// permissions of the folder.
 ///
 /// # Errors
 /// If a file or link of this name exists, or the file system refuses. The temporary file is then
 /// removed if possible.
 pub fn write_new_private(path: &Path, bytes: &[u8]) -> Result<()> {
-    let temporary = with_suffix(path, TEMPORARY_SUFFIX);
+    let temporary = with_suffix(path, &format!(".{}{TEMPORARY_SUFFIX}", std::process::id()));
     let write = || -> io::Result<()> {
         write_and_sync(open::create_private(&temporary)?, bytes)?;
         perform_rename(&temporary, path, || change::rename_new(&temporary, path))
@@ -142,11 +143,15 @@ mod tests {
     fn a_private_file_is_new_and_complete() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("secret");
+        // The temporary file of another process is neither replaced nor removed.
+        let of_other = dir.path().join("secret.0.tmp");
+        fs::write(&of_other, b"other").unwrap();
         write_new_private(&path, b"first").unwrap();
         let error = write_new_private(&path, b"second").unwrap_err();
         assert_eq!(error.error.kind(), io::ErrorKind::AlreadyExists);
         assert_eq!(fs::read(&path).unwrap(), b"first");
-        assert_eq!(entries(dir.path()).unwrap(), std::slice::from_ref(&path));
+        assert_eq!(fs::read(&of_other).unwrap(), b"other");
+        assert_eq!(entries(dir.path()).unwrap(), [path.clone(), of_other]);
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt as _;

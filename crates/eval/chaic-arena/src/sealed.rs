@@ -260,6 +260,36 @@ impl SealedSplit {
     ) -> Result<Option<Commitment>, ArenaError> {
         create_folders(folder)?;
         self.check_folder(folder)?;
+        self.generate(stop, &mut |task, k, episode| {
+            let path = folder.join(SealedSplit::file_name(task, k));
+            write_atomically(&path, episode.to_json().as_bytes())?;
+            progress();
+            Ok(())
+        })
+    }
+
+    /// Returns the commitment, and writes nothing. Returns `None` if `stop` is raised. `progress` is
+    /// called after each episode.
+    ///
+    /// # Errors
+    /// [`ArenaError`] if an episode cannot be generated.
+    pub fn commitment(
+        &self,
+        stop: &AtomicBool,
+        progress: &mut dyn FnMut(),
+    ) -> Result<Option<Commitment>, ArenaError> {
+        self.generate(stop, &mut |_, _, _| {
+            progress();
+            Ok(())
+        })
+    }
+
+    /// Passes each episode to a function with its task and number, and returns the commitment.
+    fn generate(
+        &self,
+        stop: &AtomicBool,
+        keep: &mut dyn FnMut(TaskId, usize, &Episode) -> Result<(), ArenaError>,
+    ) -> Result<Option<Commitment>, ArenaError> {
         let mut digest = Sha256::new();
         for task in &self.tasks {
             for k in 0..self.n_episodes {
@@ -269,9 +299,7 @@ impl SealedSplit {
                 let episode = self.episode(*task, k)?;
                 digest.update(episode.to_json_line());
                 digest.update("\n");
-                let path = folder.join(SealedSplit::file_name(*task, k));
-                write_atomically(&path, episode.to_json().as_bytes())?;
-                progress();
+                keep(*task, k, &episode)?;
             }
         }
         Ok(Some(Commitment {

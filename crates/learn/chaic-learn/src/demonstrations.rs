@@ -1,5 +1,6 @@
 //! Demonstrations of a training, aggregated over its iterations (DAgger) and kept in its folder.
 
+use std::io;
 use std::path::{Path, PathBuf};
 
 use chaic_files::{FileError, read_bounded, write_atomically};
@@ -9,8 +10,9 @@ use chaic_training::{Checkpoint, CheckpointError};
 use crate::candidate_scorer::CandidateSet;
 use crate::cloning::Demonstration;
 
-/// Maximum size of the file of one iteration, bytes: about 0.1 MB per episode.
-const MAX_BYTES: u64 = 1 << 32;
+/// Maximum size of the file of one iteration, bytes: 4 MiB for each of 4,096 episodes. An episode has
+/// about 0.1 MB, or 1.5 MB if each decision holds 32 earlier ones.
+const MAX_BYTES: u64 = 1 << 34;
 
 /// Sections of a file. Counts are the numbers of episodes and of demonstrations.
 const COUNTS: &str = "demonstrations.counts";
@@ -69,7 +71,7 @@ impl Demonstrations {
     /// Writes the demonstrations of one iteration.
     ///
     /// # Errors
-    /// If the file cannot be written.
+    /// If the file cannot be written, or would be too large to be read back.
     pub fn write(
         folder: &Path,
         iteration: u64,
@@ -77,7 +79,7 @@ impl Demonstrations {
         identity: &Identity,
     ) -> Result<(), FileError> {
         let bytes = to_sections(episodes).to_bytes(identity).expect("features are finite");
-        write_atomically(&path(folder, iteration), &bytes)
+        write_within(&path(folder, iteration), &bytes, MAX_BYTES)
     }
 
     /// Returns the demonstrations of the latest `max_episodes` episodes, with these added.
@@ -97,6 +99,18 @@ impl Demonstrations {
         let n_surplus = self.episodes.len().saturating_sub(max_episodes);
         self.episodes.drain(..n_surplus);
     }
+}
+
+/// Writes a file of at most `max_bytes`; more would be cut off when it is read.
+fn write_within(path: &Path, bytes: &[u8], max_bytes: u64) -> Result<(), FileError> {
+    let n = bytes.len() as u64;
+    if n > max_bytes {
+        let problem = format!(
+            "{n} bytes of demonstrations exceed the maximum of {max_bytes}; set fewer episodes per iteration"
+        );
+        return Err(FileError::context("write", path)(io::Error::other(problem)));
+    }
+    write_atomically(path, bytes)
 }
 
 fn to_sections(episodes: &[Vec<Demonstration>]) -> Checkpoint {
@@ -195,5 +209,16 @@ mod tests {
         assert!(read(4, &identity).is_err(), "a missing file");
         std::fs::write(path(folder.path(), 2), b"damaged").unwrap();
         assert!(read(3, &identity).is_err());
+    }
+
+    #[test]
+    fn a_file_that_could_not_be_read_back_is_not_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = path(folder.path(), 0);
+        let problem = write_within(&path, &[0; 9], 8).unwrap_err().to_string();
+        assert!(problem.contains("set fewer episodes"), "{problem}");
+        assert!(!path.exists());
+        write_within(&path, &[0; 8], 8).unwrap();
+        assert!(path.exists());
     }
 }

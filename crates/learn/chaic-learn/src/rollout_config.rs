@@ -1,7 +1,7 @@
 //! Configuration of the episodes that trainings of policies play.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use chaic_agents::partners::{PARTNER_VARIANTS, partner_habits};
@@ -196,11 +196,28 @@ pub(crate) fn draw_episode(task: TaskId, generator: &str, mut rng: RngStream) ->
     id
 }
 
-/// Returns the ids of the first `n` valid validation episodes of a task.
-pub(crate) fn validation_ids(task: TaskId, generator: &str, n: usize) -> Vec<String> {
+/// Returns the ids of the first `n` valid validation episodes of a task; `None` if `stop` is raised.
+pub(crate) fn validation_ids(
+    task: TaskId,
+    generator: &str,
+    n: usize,
+    stop: &AtomicBool,
+) -> Option<Vec<String>> {
     let SeedRange { first, count, .. } = SeedRange::POLICY_VALIDATION;
-    let ids = (first..first + count).map(|seed| format!("{task}/{generator}/{seed}"));
-    ids.filter(|id| find_episode(id).is_ok()).take(n).collect()
+    let mut ids = Vec::new();
+    for seed in first..first + count {
+        if ids.len() == n {
+            break;
+        }
+        if stop.load(Ordering::Relaxed) {
+            return None;
+        }
+        let id = format!("{task}/{generator}/{seed}");
+        if find_episode(&id).is_ok() {
+            ids.push(id);
+        }
+    }
+    Some(ids)
 }
 
 /// Reads the weights of an opponent model.
@@ -229,15 +246,17 @@ pub(crate) fn check_splits(key: &str, splits: &[String]) -> Result<(), String> {
 }
 
 /// Returns `n` validation episodes per task, from the last of the generators: the
-/// standard one, if there are both.
+/// standard one, if there are both. Returns `None` if `stop` is raised.
 pub(crate) fn validation_episodes(
     tasks: &[TaskId],
     splits: &[String],
     n: usize,
-) -> Vec<RolloutEpisode> {
+    stop: &AtomicBool,
+) -> Option<Vec<RolloutEpisode>> {
     let split = splits.last().map_or(GENERATORS[0], String::as_str);
-    let of_task = |task: &TaskId| validation_ids(*task, split, n);
-    tasks.iter().flat_map(of_task).map(RolloutEpisode::new).collect()
+    let of_task = |task: &TaskId| validation_ids(*task, split, n, stop);
+    let ids: Option<Vec<Vec<String>>> = tasks.iter().map(of_task).collect();
+    Some(ids?.into_iter().flatten().map(RolloutEpisode::new).collect())
 }
 
 /// Validation metric by which weights are selected: the mean transport rate with the selection of
@@ -263,7 +282,7 @@ impl Validation<'_> {
         stop: &AtomicBool,
     ) -> Option<Metrics> {
         let RolloutConfig { tasks, splits, validation_episodes: n, .. } = config;
-        let episodes = validation_episodes(tasks, splits, *n);
+        let episodes = validation_episodes(tasks, splits, *n, stop)?;
         // Validation has no rewards, so the discount is of no effect.
         let context = config.context(self.perception, 1.0, stop);
         let rates = |selection| -> Option<Vec<f64>> {
@@ -305,4 +324,16 @@ fn mean(values: &[f64]) -> f64 {
 
 pub(crate) fn mean_tr(results: &[EpisodeResult]) -> f64 {
     results.iter().map(|result| result.tr).sum::<f64>() / results.len().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_search_for_validation_episodes_can_be_stopped() {
+        let ids = |n, stop| validation_ids(TaskId::LowTarget, "gen", n, &AtomicBool::new(stop));
+        assert_eq!(ids(2, false).map(|ids| ids.len()), Some(2));
+        assert_eq!(ids(2, true), None);
+    }
 }

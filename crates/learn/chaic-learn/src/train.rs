@@ -70,6 +70,32 @@ impl TrainState {
         Arc::new(PolicyWeights::new(self.kind, &self.model, self.learner.parameters.clone()))
     }
 
+    /// Returns the parameters of the opponent model, if there is one.
+    fn opponent_parameters(&self) -> Option<&[f32]> {
+        let range = PolicyKind::opponent_range(&self.model)?;
+        Some(&self.learner.parameters[range])
+    }
+
+    /// Checks that a resumed training still has the inputs with which it began. `opponent` are the
+    /// parameters in the file of the opponent model.
+    ///
+    /// # Errors
+    /// One line that describes the change.
+    fn check_inputs(&self, opponent: Option<&[f32]>, normalizes: bool) -> Result<(), String> {
+        if self.opponent_parameters() != opponent {
+            return Err(
+                "the file of `rollout.opponent` has changed since the training began".to_owned()
+            );
+        }
+        if normalizes && self.iterations > 0 && !self.model.has_normalizer(&self.learner.parameters)
+        {
+            // The first update of the statistics would change all inputs at once.
+            let problem = "it began without `rollout.normalize`, so it cannot be enabled";
+            return Err(problem.to_owned());
+        }
+        Ok(())
+    }
+
     /// Updates the statistics that normalize the network's inputs.
     fn update_normalizer<'a>(&mut self, decisions: impl Iterator<Item = &'a CandidateSet> + Clone) {
         // Candidates have zeros in place of the features that earlier decisions add.
@@ -244,9 +270,20 @@ impl<A: Algorithm> Trainer for PolicyTrainer<A> {
         checkpoint: &Checkpoint,
         _: &AtomicBool,
     ) -> Result<Option<()>, CheckpointError> {
+        // No step changes the opponent model, so these are the parameters in its file.
+        let opponent = self.state.opponent_parameters().map(<[f32]>::to_vec);
+        let before = (self.state.learner.state(), self.state.iterations);
         self.state.resume(checkpoint)?;
-        let data = self.config.read_data(&self.folder, &self.state);
-        self.data = data.map_err(CheckpointError::Data)?;
+        let normalizes = self.config.spec().rollout.normalize;
+        let checked = self.state.check_inputs(opponent.as_deref(), normalizes);
+        match checked.and_then(|()| self.config.read_data(&self.folder, &self.state)) {
+            Ok(data) => self.data = data,
+            Err(problem) => {
+                self.state.learner.set_state(before.0);
+                self.state.iterations = before.1;
+                return Err(CheckpointError::Data(problem));
+            }
+        }
         Ok(Some(()))
     }
 

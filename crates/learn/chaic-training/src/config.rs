@@ -23,7 +23,7 @@ pub fn read_config<T: Trainer>(path: &Path) -> Result<T::Config, TrainingError> 
 
 /// Reads a configuration file, if given, and changes the keys that a user assigned on the command
 /// line: `KEY=VALUE` with a TOML key such as `rollout.image_size` and a TOML value, or text without
-/// quotes. Missing keys get their defaults.
+/// quotes. The key may be an old name. Missing keys get their defaults.
 ///
 /// # Errors
 /// As [`read_config`], and if an assignment is not of this form.
@@ -39,7 +39,7 @@ pub fn read_config_with<T: Trainer>(
     for assignment in assignments {
         let invalid =
             |problem| TrainingError::InvalidConfig(format!("--set {assignment}: {problem}"));
-        merge(&mut table, parse_assignment(assignment).map_err(invalid)?);
+        table = assign::<T>(&table, parse_assignment(assignment).map_err(invalid)?);
     }
     let config = parse_config::<T>(&table.to_string());
     config.map_err(|problem| TrainingError::InvalidConfig(without_line(&problem).to_owned()))
@@ -50,6 +50,40 @@ fn parse_assignment(text: &str) -> Result<Table, String> {
     let (key, value) = text.split_once('=').ok_or("expected KEY=VALUE")?;
     let as_written = toml::from_str(&format!("{key} = {value}"));
     as_written.or_else(|_| parse(&format!("{key} = {}", toml::Value::from(value))))
+}
+
+/// Returns the complete table of a configuration with one assignment merged into it. Old names of
+/// the assignment are replaced, since the table holds their current names.
+fn assign<T: Trainer>(table: &Table, mut assignment: Table) -> Table {
+    loop {
+        let mut merged = table.clone();
+        merge(&mut merged, assignment.clone());
+        let problem = parse::<T::Config>(&merged.to_string()).err();
+        let current = problem.as_deref().and_then(duplicate_field);
+        match current.and_then(|current| with_current_key(table, &assignment, current)) {
+            Some(renamed) => assignment = renamed,
+            None => return merged,
+        }
+    }
+}
+
+/// Returns the name in a message of [`parse`] about a key that is set under two names.
+fn duplicate_field(message: &str) -> Option<&str> {
+    let (_, rest) = message.split_once("duplicate field `")?;
+    rest.split_once('`').map(|(name, _)| name)
+}
+
+/// Renames the outermost key of an assignment that `table` lacks to `current`, which it has.
+fn with_current_key(table: &Table, assignment: &Table, current: &str) -> Option<Table> {
+    let (key, value) = assignment.iter().next().filter(|_| assignment.len() == 1)?;
+    let (key, value) = match (table.get(key), value) {
+        (None, value) if table.contains_key(current) => (current.to_owned(), value.clone()),
+        (Some(toml::Value::Table(table)), toml::Value::Table(inner)) => {
+            (key.clone(), toml::Value::Table(with_current_key(table, inner, current)?))
+        }
+        _ => return None,
+    };
+    Some(Table::from_iter([(key, value)]))
 }
 
 /// Copies the values of one table to another, recursively.

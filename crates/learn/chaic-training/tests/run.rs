@@ -13,7 +13,7 @@ use chaic_training::conformance::{bounds_every_number, refuses_damaged_checkpoin
 use chaic_training::run::checkpoint_bytes;
 use chaic_training::{
     CHECKPOINT, CONFIG, CURVES, Checkpoint, CheckpointError, CurveRecord, INITIAL_WEIGHTS, Learner,
-    Metrics, Phase, Trainer, TrainingError, TrainingRun, metrics, parse_config,
+    Metrics, Phase, Trainer, TrainingError, TrainingRun, metrics, parse_config, read_config_with,
 };
 use serde::{Deserialize, Serialize};
 
@@ -491,6 +491,24 @@ fn old_keys_have_bounds_and_exclude_the_current_ones() {
         ("speed = 0.5", "unknown field `speed`"),
     ] {
         let problem = parsed(text).unwrap_err();
+        assert!(problem.contains(expected) && !problem.contains('\n'), "{problem}");
+    }
+}
+
+#[test]
+fn assignments_may_have_old_keys() {
+    let read = |assignments: &[&str]| {
+        let assignments: Vec<String> = assignments.iter().map(|text| (*text).to_owned()).collect();
+        read_config_with::<Toy>(None, &assignments)
+    };
+    let expected = ToyConfig { learning_rate: 0.5, a: 1, ..ToyConfig::default() };
+    assert_eq!(read(&["rate=0.5", "a=1"]).unwrap(), expected);
+    assert_eq!(read(&["rate=0.25", "a=1", "learning_rate=0.5"]).unwrap(), expected);
+    for (assignment, expected) in [
+        ("rate=2.0", "`learning_rate` is 2; it must be from 0 to 1"),
+        ("speed=0.5", "unknown field `speed`"),
+    ] {
+        let problem = read(&[assignment]).unwrap_err().to_string();
         assert!(problem.contains(expected) && !problem.contains('\n'), "{problem}");
     }
 }

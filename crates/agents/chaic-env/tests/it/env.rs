@@ -116,6 +116,25 @@ fn single_frames_give_the_same_records() {
 }
 
 #[test]
+fn the_end_is_recorded_once() {
+    let mut setup = test_episode(TaskId::LowTarget).into_setup();
+    setup.horizon = 60;
+    let episode = Episode::new("short", "files", None, setup).unwrap();
+    let mut env = Env::new(config(&episode), Some(rhp())).unwrap();
+    let mut records = Vec::new();
+    assert_eq!(run(&mut env, UNTIL, &mut records), AdvanceOutcome::Ended);
+    assert!(matches!(records.last(), Some(Record::End(_))));
+    let n = records.len();
+    assert_eq!(run(&mut env, UNTIL, &mut records), AdvanceOutcome::Ended);
+    let mut sink = |record: &Record| {
+        records.push(record.clone());
+        Ok::<(), AgentError>(())
+    };
+    assert_eq!(env.run_frame(&mut sink), Ok(AdvanceOutcome::Ended));
+    assert_eq!(records.len(), n);
+}
+
+#[test]
 fn a_reset_environment_equals_a_new_one() {
     let tasks = [TaskId::Obstacle, TaskId::Obstacle, TaskId::Shopping, TaskId::MovingHouse];
     let mut env = Env::new(config(&test_episode(TaskId::NoConstraint)), Some(rhp())).unwrap();

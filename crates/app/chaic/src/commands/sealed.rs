@@ -56,7 +56,7 @@ pub(super) fn seal(
     };
     let split = SealedSplit::new(secret, tasks, size.n_episodes).with_partners(size.n_partners);
     let episodes = out.join(EPISODES);
-    let Some(commitment) = write_episodes(&split, &episodes)? else {
+    let Some(commitment) = generate(&split, Some(&episodes))? else {
         return Ok(ExitStatus::Interrupted);
     };
     let partners = split.partners().map(|suite| (partners_path, suite));
@@ -102,10 +102,14 @@ pub(super) fn open(
         let text = format!("{name}: the split has no partners; omit --partners");
         return Err(EvalError::Options(text).into());
     }
-    let Some(opened) = write_episodes(&split, out)? else {
+    // Other episodes than the committed ones must not remain on the disk, so the check comes first.
+    let Some(opened) = generate(&split, None)? else {
         return Ok(ExitStatus::Interrupted);
     };
     commitment.check_content(&opened).context(name)?;
+    if generate(&split, Some(out))?.is_none() {
+        return Ok(ExitStatus::Interrupted);
+    }
     if let Some((path, suite)) = partners.zip(suite) {
         write_atomically(path, suite.to_json().as_bytes())?;
     }
@@ -129,11 +133,16 @@ pub(super) fn read_commitment(path: &Path) -> Result<Commitment> {
     Commitment::parse(&bytes).with_context(|| path.display().to_string())
 }
 
-/// Writes the episodes of a split. Returns `None` if the user stopped it.
-fn write_episodes(split: &SealedSplit, folder: &Path) -> Result<Option<Commitment>> {
+/// Generates the episodes of a split, and writes them to a folder if one is given. Returns `None` if the
+/// user stopped it.
+fn generate(split: &SealedSplit, folder: Option<&Path>) -> Result<Option<Commitment>> {
     let stop = interrupt::stop_flag()?;
     let bar = bars::count_bar(split.n_total() as u64, "episodes");
-    let commitment = split.write(folder, stop, &mut || bar.inc(1))?;
+    let mut progress = || bar.inc(1);
+    let commitment = match folder {
+        Some(folder) => split.write(folder, stop, &mut progress)?,
+        None => split.commitment(stop, &mut progress)?,
+    };
     bar.finish_and_clear();
     if commitment.is_none() {
         print_error("stopped; the same command starts again");

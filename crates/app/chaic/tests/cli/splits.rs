@@ -102,6 +102,8 @@ fn a_sealed_split_is_played_and_opened_by_its_secret_alone() {
     assert!(refused.contains("64 hexadecimal digits"), "{refused}");
     let forged = commitment.replace("\"episodes_sha256\": \"", "\"episodes_sha256\": \"0");
     fs::write(at.join("sealed/commitment.json"), forged).expect("the disk has space");
+    fs::remove_dir_all(at.join("opened")).expect("it was written above");
     let refused = run_err(at, &[&open[..], &["--secret", "secret"]].concat());
     assert!(refused.contains("the episodes differ from those of the commitment"), "{refused}");
+    assert!(!at.join("opened").exists(), "episodes were written before the check");
 }

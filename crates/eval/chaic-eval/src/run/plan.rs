@@ -77,6 +77,10 @@ pub(super) fn plan(options: &RunOptions, files: &[Episode]) -> Result<Vec<Episod
 }
 
 /// Checks that the first episode of each task can be played with the requested partner.
+///
+/// It finds what all episodes of a task share, such as a house without a bicycle. A person that does not
+/// fit at the start of a later episode is found when that episode is played: generating all episodes of a
+/// large split would delay the start.
 pub(super) fn check_partner(jobs: &[EpisodeJob]) -> Result<()> {
     let mut tasks = BTreeSet::new();
     let mut first_jobs = jobs.iter().filter(|job| tasks.insert(job.key.task));

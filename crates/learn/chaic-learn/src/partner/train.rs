@@ -170,19 +170,27 @@ impl PartnerCloningConfig {
         self.drawn(id, "demonstrated habits", index)
     }
 
-    /// Returns the validation episodes: those of each task, from the last generator.
-    fn validation_episodes(&self) -> Result<Vec<DemonstrationEpisode>, TrainingError> {
+    /// Returns the validation episodes: those of each task, from the last generator. Returns `None`
+    /// if `stop` is raised.
+    fn validation_episodes(
+        &self,
+        stop: &AtomicBool,
+    ) -> Result<Option<Vec<DemonstrationEpisode>>, TrainingError> {
         if let Some(recordings) = self.read_recordings(Part::Validation)? {
-            return Ok(recordings.iter().map(|recording| self.recorded(recording)).collect());
+            let episodes = recordings.iter().map(|recording| self.recorded(recording));
+            return Ok(Some(episodes.collect()));
         }
         let split = self.splits.last().map_or(GENERATORS[0], String::as_str);
-        let ids = self.tasks.iter().map(|t| validation_ids(*t, split, self.validation_episodes));
-        let ids: Vec<Vec<String>> = ids.collect();
+        let of_task = |t: &TaskId| validation_ids(*t, split, self.validation_episodes, stop);
+        let ids: Option<Vec<Vec<String>>> = self.tasks.iter().map(of_task).collect();
+        let Some(ids) = ids else { return Ok(None) };
         // The tasks take turns.
         let in_turn =
             (0..self.validation_episodes).flat_map(|k| ids.iter().filter_map(move |i| i.get(k)));
         let episodes = in_turn.zip(0..);
-        Ok(episodes.map(|(id, index)| self.drawn(id.clone(), "validation habits", index)).collect())
+        let drawn =
+            |(id, index): (&String, u64)| self.drawn(id.clone(), "validation habits", index);
+        Ok(Some(episodes.map(drawn).collect()))
     }
 }
 
@@ -264,13 +272,15 @@ impl Trainer for PartnerCloningTrainer {
         config: &PartnerCloningConfig,
         folder: &Path,
         _: &mut dyn FnMut(&str),
-        _: &AtomicBool,
+        stop: &AtomicBool,
     ) -> Result<Option<PartnerCloningTrainer>, TrainingError> {
+        let recordings = config.read_recordings(Part::Training)?;
+        let Some(validation) = config.validation_episodes(stop)? else { return Ok(None) };
         let model = partner_network();
         let learner = Learner::new(&model.network, config.seed, config.shards);
         Ok(Some(PartnerCloningTrainer {
-            recordings: config.read_recordings(Part::Training)?,
-            validation: config.validation_episodes()?,
+            recordings,
+            validation,
             config: config.clone(),
             folder: folder.to_owned(),
             model,

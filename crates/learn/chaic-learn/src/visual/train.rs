@@ -226,7 +226,8 @@ impl Trainer for VisualTrainer {
         let weights = Arc::new(VisualWeights::new(model, parameters));
         let policies = Arc::new(VisualPolicies::AllTasks(weights));
         let episodes =
-            validation_episodes(&config.tasks, &config.splits, config.validation_episodes);
+            validation_episodes(&config.tasks, &config.splits, config.validation_episodes, stop);
+        let Some(episodes) = episodes else { return Ok(None) };
         let rate = |episode: &RolloutEpisode| {
             let helper =
                 VisualHelper::create(Arc::clone(&policies), RuleSet::PAPER.planner, &**perception);

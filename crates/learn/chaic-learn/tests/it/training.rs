@@ -159,6 +159,40 @@ fn inputs_are_normalized_only_from_the_start() {
 }
 
 #[test]
+fn a_training_whose_opponent_or_normalizer_changed_is_not_resumed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("opponent");
+    let write = |seed: u64, is_granted: bool| {
+        let network = opponent::network::network().network;
+        let parameters = network.init_parameters(seed);
+        let kind = opponent::network::kind(is_granted);
+        fs::write(&path, weights::to_bytes(&network, &parameters, kind).unwrap()).unwrap();
+    };
+    let mut config = PpoTrainingConfig { rollout: small_rollout(), ..PpoTrainingConfig::default() };
+    config.rollout.opponent = Some(path.clone());
+    let new = |config: &PpoTrainingConfig| {
+        let trainer = PolicyTrainer::new(config, folder.path(), &mut |_| (), &NEVER_STOP);
+        trainer.unwrap().unwrap()
+    };
+    write(1, false);
+    let mut checkpoint = new(&config).checkpoint();
+    checkpoint.insert_integers("policy.iterations", vec![1]);
+    assert_eq!(new(&config).resume(&checkpoint, &NEVER_STOP), Ok(Some(())));
+    let refused = |config: &PpoTrainingConfig, word: &str| {
+        let mut trainer = new(config);
+        let before = trainer.checkpoint();
+        let problem = trainer.resume(&checkpoint, &NEVER_STOP).unwrap_err().to_string();
+        assert!(problem.contains(word) && !problem.contains('\n'), "{problem}");
+        assert!(trainer.checkpoint() == before);
+    };
+    let mut normalized = config.clone();
+    normalized.rollout.normalize = true;
+    refused(&normalized, "`rollout.normalize`");
+    write(2, true);
+    refused(&config, "`rollout.opponent` has changed");
+}
+
+#[test]
 fn damaged_checkpoints_and_values_out_of_bounds_are_refused() {
     fn check<T: Trainer>(config: &T::Config) {
         let folder = tempfile::tempdir().unwrap();

@@ -1,6 +1,7 @@
 //! `chaic episodes seal` and `chaic episodes open`.
 
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context as _, Result};
 use chaic_arena::{Commitment, SealedSplit, Secret};
@@ -56,7 +57,7 @@ pub(super) fn seal(
     };
     let split = SealedSplit::new(secret, tasks, size.n_episodes).with_partners(size.n_partners);
     let episodes = out.join(EPISODES);
-    let Some(commitment) = generate(&split, Some(&episodes))? else {
+    let Some(commitment) = generate(&split, Some(&episodes), interrupt::stop_flag()?)? else {
         return Ok(ExitStatus::Interrupted);
     };
     let partners = split.partners().map(|suite| (partners_path, suite));
@@ -103,11 +104,12 @@ pub(super) fn open(
         return Err(EvalError::Options(text).into());
     }
     // Other episodes than the committed ones must not remain on the disk, so the check comes first.
-    let Some(opened) = generate(&split, None)? else {
+    let stop = interrupt::stop_flag()?;
+    let Some(opened) = generate(&split, None, stop)? else {
         return Ok(ExitStatus::Interrupted);
     };
     commitment.check_content(&opened).context(name)?;
-    if generate(&split, Some(out))?.is_none() {
+    if generate(&split, Some(out), stop)?.is_none() {
         return Ok(ExitStatus::Interrupted);
     }
     if let Some((path, suite)) = partners.zip(suite) {
@@ -135,8 +137,11 @@ pub(super) fn read_commitment(path: &Path) -> Result<Commitment> {
 
 /// Generates the episodes of a split, and writes them to a folder if one is given. Returns `None` if the
 /// user stopped it.
-fn generate(split: &SealedSplit, folder: Option<&Path>) -> Result<Option<Commitment>> {
-    let stop = interrupt::stop_flag()?;
+fn generate(
+    split: &SealedSplit,
+    folder: Option<&Path>,
+    stop: &AtomicBool,
+) -> Result<Option<Commitment>> {
     let bar = bars::count_bar(split.n_total() as u64, "episodes");
     let mut progress = || bar.inc(1);
     let commitment = match folder {

@@ -250,7 +250,7 @@ fn an_incomplete_last_line_is_left_out_and_reported() {
         export(&plan, std::slice::from_ref(&file), &dir.path().join(out))
     };
     let (before, last) = (whole[..13].concat(), &whole[13]);
-    for (k, torn) in [&last[..8], "{\"type\":\"caf\u{e9}"].into_iter().enumerate() {
+    for (k, torn) in [&last[..8], "{\"type\":\"na\u{ef}"].into_iter().enumerate() {
         // The second line ends within a character.
         let text = format!("{before}{torn}");
         let report = exported(&text.as_bytes()[..text.len() - 1], &format!("torn{k}"));

@@ -85,8 +85,10 @@ def readable(maker: Callable[[], Any]) -> list[str]:
     module = sys.modules.get(getattr(without_partial(maker), "__module__", None) or "")
     file = getattr(module, "__file__", None) or _main_file()
     if file is not None:
-        is_main = module is None or module.__name__ == "__main__"
-        package = bool(getattr(sys.modules["__main__"], "__package__", None)) if is_main else "." in module.__name__
+        if module is None or module.__name__ == "__main__":
+            package = bool(getattr(sys.modules["__main__"], "__package__", None))
+        else:
+            package = "." in module.__name__
         path = Path(file).absolute()
         found.add(str(path.parent if package and not is_too_wide(path.parent) else path))
     main_file = _main_file()

@@ -6,7 +6,7 @@ set shell := ["bash", "-euo", "pipefail", "-c"]
 default:
     @just --list
 
-# Fast loop: format, lints of all targets, checks of the repository itself
+# Fast loop: format and lints of all targets
 check:
     cargo fmt --all --check
     cargo clippy --workspace --all-targets --locked -- -D warnings

@@ -4,6 +4,7 @@ import contextlib
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
@@ -16,7 +17,15 @@ def programs():
         return [pathlib.Path(folder).resolve() / name for name in names]
     packages = ["--package", "chaic", "--package", "chaic-llm-standin"]
     subprocess.run(["cargo", "build", "--release", "--quiet", *packages], cwd=ROOT, check=True)
-    return [ROOT / "target/release" / name for name in names]
+    # Cargo starts in ROOT, so a relative folder is one below it.
+    target = ROOT / os.environ.get("CARGO_TARGET_DIR", "target")
+    return [target / "release" / name for name in names]
+
+
+def remove_run(folder):
+    """Removes the run of an earlier call, since a new run is refused there. Other folders stay."""
+    if (folder / "run.json").exists():
+        shutil.rmtree(folder)
 
 
 @contextlib.contextmanager

@@ -8,6 +8,7 @@ import {
   mkdtempSync,
   readdirSync,
   readFileSync,
+  rmSync,
   writeFileSync,
 } from "node:fs";
 import { tmpdir } from "node:os";
@@ -61,12 +62,14 @@ const options = {
   // The glue loads the module from an address only if it gets no bytes.
   define: { "import.meta.url": '""' },
 };
-for (const name of isScripts ? pages : ["worker", ...pages]) {
+const scripts = isScripts ? pages : ["worker", ...pages];
+for (const name of scripts) {
   await build({ ...options, entryPoints: [`src/${name}.ts`], outfile: join(out, `${name}.js`) });
 }
 
 if (isCheck) {
-  for (const name of ["worker.js", "page.js", "study.js", module]) {
+  const files = scripts.map((name) => `${name}.js`);
+  for (const name of isScripts ? files : [...files, module]) {
     const [built, committed] = [out, join(root, "crates/eval/chaic-page/bundle")].map((folder) => {
       const content = readFileSync(join(folder, name));
       // Versions of Node compress differently.
@@ -77,4 +80,5 @@ if (isCheck) {
       process.exitCode = 1;
     }
   }
+  rmSync(out, { recursive: true });
 }

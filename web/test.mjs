@@ -131,6 +131,12 @@ test("a replay plays, pauses and moves to events by keyboard", async () => {
   const event = await frame();
   assert.ok(event > paused, `${event} after ${paused}`);
   assert.equal(await page.locator("chaic-replay [aria-current=step]").count(), 1);
+  // Many layouts have brackets on the third level.
+  await page.evaluate(() => {
+    const section = document.querySelector("chaic-replay").shadowRoot.querySelector("section");
+    section.dispatchEvent(new KeyboardEvent("keydown", { key: "]", ctrlKey: true, altKey: true }));
+  });
+  assert.ok((await frame()) > event);
   await page.close();
 });
 
@@ -229,6 +235,9 @@ test("a damaged page says what is wrong", async () => {
   const status = page.locator("[data-status]");
   await page.waitForFunction(() => document.querySelector("[data-status]").textContent);
   assert.match(await status.innerText(), /^Cannot show the replays/);
+  await page.locator("#choice").selectOption("1");
+  await shown(page);
+  assert.equal(await status.innerText(), "");
   await page.close();
 });
 
@@ -322,6 +331,8 @@ test("a game played by keyboard verifies on the command line, and can be watched
   assert.match(text, /wants something that you do not know/);
   assert.deepEqual(await findings(page), []);
   await page.getByRole("button", { name: "Stop here" }).click();
+  await page.getByText("The game has ended.").waitFor();
+  assert.equal(await page.locator("chaic-play .plans").count(), 0);
   const trace = await verified(page, "game.jsonl");
   assert.match(trace, /"helper":"human"/);
   await page.getByRole("button", { name: "Watch the replay" }).click();

@@ -5,7 +5,7 @@
 status is 1 if an episode was lost. The endpoint is the stand-in, so scores say nothing about
 language models.
 
-usage: benches/faults/run.py [--out DIR] [--rate 0.3] [--helper llm] [--first N] [KIND ...]
+usage: benches/faults/run.py [--out DIR] [--rate 0.3] [--helper llm] [--n-episodes N] [KIND ...]
 
 Environment:
   BIN   folder of built programs (default: built by cargo build --release)
@@ -19,7 +19,7 @@ import sys
 import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
-from programs import ROOT, programs, serving  # noqa: E402
+from programs import ROOT, programs, remove_run, serving  # noqa: E402
 
 KINDS = """refused reset timeout slow-drip 429-with-wait 429 500 503 empty truncated wrong-schema
 plan-not-listed huge invalid-utf8""".split()
@@ -48,6 +48,8 @@ def arguments():
 def play(chaic, standin, args, kind):
     """Plays a run under one kind of fault; returns the results of its episodes."""
     out = args.out / kind
+    # Otherwise the results of an earlier call would be counted.
+    remove_run(out)
     config = args.out / "timeouts.toml"
     config.write_text(CONFIG)
     faulty = [] if kind == "none" else ["--fault", f"{kind}={args.rate}"]
@@ -58,15 +60,16 @@ def play(chaic, standin, args, kind):
         command += ["--n-episodes", str(args.n_episodes)] if args.n_episodes else []
         with open(args.out / f"{kind}.log", "w") as log:
             subprocess.run(command, stdout=log, stderr=log, check=False)
-    lines = (out / "results.jsonl").read_text().splitlines()
-    return [json.loads(line) for line in lines]
+    results = out / "results.jsonl"
+    # Without a result, all episodes are lost; the log has the reason.
+    return [json.loads(line) for line in results.read_text().splitlines()] if results.exists() else []
 
 
 def main():
     args = arguments()
     args.out.mkdir(parents=True, exist_ok=True)
     chaic, standin = programs()
-    expected = 8 * (args.n_episodes or 12)
+    expected = 8 * (args.n_episodes or 12) * len(args.helper.split(","))
     print("| fault | episodes scored | questions | requests | failed | fallbacks | minutes |")
     print("|---|---|---|---|---|---|---|")
     lost = 0
@@ -76,7 +79,8 @@ def main():
         minutes = (time.monotonic() - start) / 60.0
         scored = sum(r["status"] == "done" for r in results)
         lost += expected - scored
-        counts = [r["counts"] for r in results]
+        # A failed episode has no counts.
+        counts = [r.get("counts", {}) for r in results]
         total = lambda *names: sum(c.get(f"helper.{n}", 0) for c in counts for n in names)
         fallbacks = total("fallback_invalid", "fallback_fault")
         print(

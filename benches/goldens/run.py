@@ -25,7 +25,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 TABLE = ROOT / "crates/dev/chaic-goldens/goldens.txt"
-TARGET_DIR = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
+TARGET_DIR = ROOT / os.environ.get("CARGO_TARGET_DIR", "target")
 SYSROOT = "/usr/aarch64-linux-gnu"
 
 

@@ -26,7 +26,7 @@ rm -f "$OUT"/peer-* "$OUT"/chaic-*.json
 
 if [ -z "${CHAIC:-}" ]; then
     (cd "$ROOT" && cargo build --release --quiet)
-    CHAIC=$ROOT/target/release/chaic
+    CHAIC=$(cd "$ROOT" && cd "${CARGO_TARGET_DIR:-target}" && pwd)/release/chaic
 fi
 on_one_core() { taskset -c "$CORE" "$@"; }
 

@@ -17,7 +17,7 @@ import subprocess
 import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
-from programs import ROOT, programs, serving  # noqa: E402
+from programs import ROOT, programs, remove_run, serving  # noqa: E402
 
 PAGE = ROOT / "docs/reference/language-prompts.md"
 TITLES = {
@@ -85,6 +85,7 @@ def main():
             "helpers": ["--helper", "llm,llm_known_task"],
             "partner": ["--task", "low_target", "--helper", "none", "--partner", "llm"],
         }.items():
+            remove_run(out / run)
             command = [chaic, "eval", "--n-episodes", "1", *options, *model, "--out", out / run]
             subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     page = [HEAD]

@@ -152,10 +152,13 @@ def main() -> None:
                 steps = measured()
                 of = version(package_name)
             except Exception as error:
-                print(f"| {name} | not measured: {type(error).__name__}: {str(error).splitlines()[0][:100]} |||")
+                reason = " ".join([f"{type(error).__name__}:", *str(error).splitlines()[:1]])
+                print(f"| {name} | not measured: {reason[:100]} |||")
                 continue
-            ours = ours or steps
-            print(f"| {name} | {of} | {worlds} | {steps:.1f} | {ours / steps:.1f} |", flush=True)
+            if package_name == "chaic":
+                ours = steps
+            speedup = f"{ours / steps:.1f}" if ours else "/"
+            print(f"| {name} | {of} | {worlds} | {steps:.1f} | {speedup} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -20,11 +20,10 @@ declare module "*/chaic_web.js" {
     choose_plan(plan: string): boolean;
     act(action: string): boolean;
     trace(): string;
+    reference_rate(episode: Uint8Array, helper: string): number;
     view(side: number): Picture;
     free(): void;
   }
-
-  export function reference_rate(episode: Uint8Array, helper: string, seed: number): number;
 
   export function continued_trace(trace: Uint8Array, episode: Uint8Array, frame: number, helper: string): string;
 

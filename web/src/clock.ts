@@ -67,7 +67,10 @@ export class PlaybackClock implements ReactiveController {
   /** Handles the keys of a replay. */
   press(event: KeyboardEvent): void {
     const target = event.composedPath()[0] as HTMLElement;
-    if (event.ctrlKey || event.altKey || event.metaKey || target.matches("select, input")) return;
+    // Many layouts have brackets on the third level, whose key counts as Alt, or as Ctrl and Alt.
+    const isBracket = event.altKey && ["[", "]"].includes(event.key);
+    const isShortcut = event.metaKey || ((event.ctrlKey || event.altKey) && !isBracket);
+    if (isShortcut || target.matches("select, input")) return;
     const step = event.shiftKey ? (this.frames?.perSecond ?? 30) : 1;
     const actions: Record<string, () => void> = {
       " ": () => this.toggle(),
@@ -96,7 +99,8 @@ export class PlaybackClock implements ReactiveController {
   private advance(time: number): void {
     if (!this.isPlaying || !this.frames) return;
     // A tab in the background gets no callbacks; the replay goes on where it was.
-    const elapsed = Math.min(time - this.lastTime, 250) / 1000;
+    // The time of a callback can be before the press that started the replay.
+    const elapsed = Math.max(0, Math.min(time - this.lastTime, 250)) / 1000;
     this.lastTime = time;
     this.position += elapsed * this.speed * this.frames.perSecond;
     const frame = Math.min(Math.floor(this.position), this.frames.last);

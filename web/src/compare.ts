@@ -60,8 +60,9 @@ export class ChaicCompare extends LitElement {
     this.sources?.forEach((source, run) => this.open(run, source));
   }
 
-  /** Shows a frame and stops. */
+  /** Shows a frame and stops; as the first one if the replays are not verified yet. */
   seek(frame: number): void {
+    if (!this.infos[0] || !this.infos[1]) this.start = frame;
     this.playback.seek(frame);
   }
 

@@ -79,9 +79,18 @@ class Replays {
       return;
     }
     this.select(wanted);
-    const [first, second] = await Promise.all(contents.map((content) => this.source(content)));
+    let sources: Source[];
+    try {
+      sources = await Promise.all(contents.map((content) => this.source(content)));
+    } catch (problem) {
+      // The replay before would look like the chosen one.
+      if (this.isChosen(wanted)) this.clear();
+      throw problem;
+    }
     // Another choice was made meanwhile.
     if (!this.isChosen(wanted)) return;
+    tell("");
+    const [first, second] = sources;
     const common = { workerSource: workerSource(), start: this.shown.frame };
     if (second) {
       const element = document.createElement("chaic-compare") as ChaicCompare;
@@ -95,13 +104,19 @@ class Replays {
 
   /** Shows an element with a replay that is not among those of the page. */
   showOther(element: ChaicReplay | ChaicCompare): void {
-    clearTimeout(this.pending);
-    this.shown = undefined;
-    this.element = undefined;
+    this.clear();
     this.choice.selectedIndex = -1;
     this.other.replaceChildren();
     this.other.disabled = true;
     this.player.replaceChildren(element);
+  }
+
+  /** Shows no replay. */
+  private clear(): void {
+    clearTimeout(this.pending);
+    this.shown = undefined;
+    this.element = undefined;
+    this.player.replaceChildren();
   }
 
   private isChosen({ replay, other }: Shown): boolean {
@@ -232,9 +247,15 @@ async function main(): Promise<void> {
   await replays.show(address());
 }
 
-function fail(problem: unknown): void {
+/** Writes the status of the page. */
+function tell(text: string): void {
   const status = document.querySelector("[data-status]");
-  if (status) status.textContent = `Cannot show the replays: ${String(problem)}`;
+  if (status) status.textContent = text;
+}
+
+function fail(problem: unknown): void {
+  const purpose = document.querySelector("#game") ? "play" : "show the replays";
+  tell(`Cannot ${purpose}: ${String(problem)}`);
 }
 
 addEventListener("unhandledrejection", (event) => fail(event.reason));

@@ -158,9 +158,11 @@ export class ChaicPlay extends LitElement {
   }
 
   private fail(problem: string): void {
-    this.problem = problem;
-    // A study goes on with the next episode.
+    // Later problems follow from the first one.
+    this.problem ??= problem;
+    // A study goes on with the next episode; the trace of another game is offered as far as it goes.
     if (this.game?.isStudy) this.dispatchEvent(new CustomEvent("over", { detail: "left" }));
+    else if (this.shown) this.stop();
   }
 
   private begin(): void {
@@ -224,6 +226,7 @@ export class ChaicPlay extends LitElement {
   private stop(): void {
     if (this.isOver) return;
     this.isOver = true;
+    this.scanner.stop();
     this.requestTrace();
   }
 
@@ -280,7 +283,8 @@ export class ChaicPlay extends LitElement {
     const target = event.composedPath()[0] as HTMLElement;
     if (event.ctrlKey || event.altKey || event.metaKey || target.matches("select, input")) return;
     const isSteps = this.game?.config.level === "steps";
-    const digit = /^[1-9]$/.test(event.key) ? Number(event.key) - 1 : undefined;
+    // A key that is held chooses one plan, not those of the next turns.
+    const digit = /^[1-9]$/.test(event.key) && !event.repeat ? Number(event.key) - 1 : undefined;
     const steps: Record<string, Action> = {
       ArrowUp: "move_forward",
       ArrowLeft: "turn_left",
@@ -303,6 +307,7 @@ export class ChaicPlay extends LitElement {
     const { info, shown } = this;
     if (this.problem) return html`<p class="problem" role="alert">Cannot play: ${this.problem}</p>`;
     if (!info) return this.isOver ? html`` : html`<p role="status">Loading ...</p>`;
+    const inputs = this.game?.config.level === "plans" ? this.plans(shown) : this.steps(shown);
     return html`<section aria-label="Play" @keydown=${(event: KeyboardEvent) => this.press(event)}>
       ${this.heading(info)}
       <div class="columns">
@@ -318,8 +323,10 @@ export class ChaicPlay extends LitElement {
         </figure>
         <div>
           ${shown ? this.status(shown) : nothing}
-          ${this.game?.config.level === "plans" ? this.plans(shown) : this.steps(shown)}
-          ${this.isOver ? nothing : html`<p><button type="button" class="link" @click=${() => this.stop()}>Stop here</button></p>`}
+          ${this.isOver
+            ? nothing
+            : html`${inputs}
+                <p><button type="button" class="link" @click=${() => this.stop()}>Stop here</button></p>`}
           ${shown?.status === "ended" && !this.game?.isStudy ? this.result(shown) : nothing} ${this.events()}
         </div>
       </div>
@@ -347,12 +354,13 @@ export class ChaicPlay extends LitElement {
     const { action, plan } = shown.caption;
     const hands = shown.hands.map((held) => held ?? "nothing");
     const delivered = shown.progress ? `, ${shown.progress[0]} of ${shown.progress[1]} delivered` : "";
+    const refused = shown.is_refused ? "Your last choice was no longer possible. Choose again." : "";
     return html`<p class="time">
         ${this.time(shown.frame)} of ${this.time(shown.horizon)}${delivered}
       </p>
       <p>Left hand: ${hands[0]}; right hand: ${hands[1]}</p>
       <p role="status">You: ${action}${plan ? ` (${plan})` : ""}${shown.failure ? `; failed: ${shown.failure}` : ""}</p>
-      <p role="status">${shown.is_refused ? "Your last choice was no longer possible. Choose again." : ""}</p>`;
+      <p role="status">${this.isOver ? "The game has ended." : refused}</p>`;
   }
 
   private plans(shown: LiveState | undefined): TemplateResult {

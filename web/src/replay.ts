@@ -62,8 +62,9 @@ export class ChaicReplay extends LitElement {
     if (changed.has("source") && this.source) this.open(this.source);
   }
 
-  /** Shows a frame and stops. */
+  /** Shows a frame and stops; as the first one if the replay is not verified yet. */
   seek(frame: number): void {
+    if (!this.info?.is_complete) this.start = frame;
     this.playback.seek(frame);
   }
 
@@ -133,12 +134,13 @@ export class ChaicReplay extends LitElement {
 
   override render(): TemplateResult {
     const { info } = this;
+    const progress = this.problem ? nothing : html`<p role="status">Verifying ...</p>`;
     if (!info) {
       return html`<p role="status">${this.problem ? `Cannot show this replay: ${this.problem}` : "Replaying ..."}</p>`;
     }
     return html`<section aria-label="Replay" @keydown=${(event: KeyboardEvent) => this.playback.press(event)}>
       ${this.heading(info)} ${this.pictures(info)}
-      ${info.is_complete ? this.details(info) : html`<p role="status">Verifying ...</p>`}
+      ${info.is_complete ? this.details(info) : progress}
     </section>`;
   }
 

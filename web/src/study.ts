@@ -30,6 +30,8 @@ import { paragraphs } from "./study/text.js";
 /** Letters and digits of participant codes: those that are not mistaken for each other. */
 const ALPHABET = "ABCDEFGHJKLMNPQRSTUVWXYZ23456789";
 const CODE_LENGTH = 10;
+/** Time for which a browser can read a downloaded file, milliseconds. */
+const KEPT_DOWNLOAD_MS = 60_000;
 
 /** Draws a participant code. The alphabet has 32 characters, so all are equally likely. */
 function drawCode(): string {
@@ -343,7 +345,8 @@ export class ChaicStudy extends LitElement {
     link.href = URL.createObjectURL(new Blob([file], { type: "application/jsonl" }));
     link.download = `${this.code()}.jsonl`;
     link.click();
-    URL.revokeObjectURL(link.href);
+    // Some browsers read the file after the click.
+    setTimeout(() => URL.revokeObjectURL(link.href), KEPT_DOWNLOAD_MS);
   }
 
   /** Returns the choices that are offered to a person with one switch. */

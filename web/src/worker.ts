@@ -1,6 +1,6 @@
 // Worker that re-simulates, plays and draws, so that the page stays responsive.
 
-import { continued_trace, initSync, Live, Player, reference_rate } from "../pkg/chaic_web.js";
+import { continued_trace, initSync, Live, Player } from "../pkg/chaic_web.js";
 import type {
   LayerData,
   MapLabel,
@@ -17,8 +17,9 @@ import type {
 let player: Player | undefined;
 let live: Live | undefined;
 let episode: Uint8Array | undefined;
-let seed = 0;
 let isRerunning = false;
+/** Trap of the module, which runs no further tasks. */
+let trap: WebAssembly.RuntimeError | undefined;
 /** Frames that are drawn once in advance, so that browsers optimize the module before a person seeks. */
 let warmUpFrames: number[] = [];
 
@@ -46,7 +47,7 @@ function answer(request: Request): void {
       initSync({ module: request.module });
       player = new Player(request.trace, request.episode);
       send({ type: "opened", info: JSON.parse(player.info()) });
-      setTimeout(verify);
+      later(verify);
       break;
     case "frame":
       drawFrame(request);
@@ -69,8 +70,8 @@ function answer(request: Request): void {
       send({ type: "trace", trace: continued_trace(request.trace, request.episode, request.frame, request.helper) });
       break;
     case "reference":
-      if (!episode) break;
-      send({ type: "reference", helper: request.helper, rate: reference_rate(episode, request.helper, seed) });
+      if (!live || !episode) break;
+      send({ type: "reference", helper: request.helper, rate: live.reference_rate(episode, request.helper) });
       break;
   }
 }
@@ -81,7 +82,7 @@ function verify(): void {
   const start = performance.now();
   while (!player.verify(VERIFIED_FRAMES)) {
     if (performance.now() - start < SLICE_MS) continue;
-    setTimeout(verify);
+    later(verify);
     return;
   }
   const info: ReplayInfo = JSON.parse(player.info());
@@ -96,7 +97,7 @@ function warmUp(wanted: Wanted): void {
   player.seek(frame);
   for (const agent of wanted.agents) player.view(agent, wanted.viewPx).free();
   if (wanted.mapPx > 0) player.map(wanted.mapPx).free();
-  setTimeout(() => warmUp(wanted));
+  later(() => warmUp(wanted));
 }
 
 function drawnMap(from: Player, widthPx: number): MapPicture {
@@ -113,7 +114,7 @@ function drawFrame(request: Extract<Request, { type: "frame" }>): void {
   const pictures = map ? [...views, map] : views;
   const layers = layerData(player, request.memories, request.withLimits);
   send({ type: "frame", state, views, map, layers }, pictures.map((picture) => picture.rgba.buffer));
-  if (warmUpFrames.length > 0) setTimeout(() => warmUp(request));
+  if (warmUpFrames.length > 0) later(() => warmUp(request));
 }
 
 function layerData(from: Player, agents: number[], withLimits: boolean): LayerData {
@@ -133,13 +134,12 @@ function rerun(lastMessage: number): void {
   while (!state.is_complete && performance.now() - start < SLICE_MS);
   const isDue = performance.now() - lastMessage > PROGRESS_MS || state.is_complete;
   if (isDue) send({ type: "rerun", state });
-  if (!state.is_complete) setTimeout(() => rerun(isDue ? performance.now() : lastMessage));
+  if (!state.is_complete) later(() => rerun(isDue ? performance.now() : lastMessage));
 }
 
 function play(request: Extract<Request, { type: "play" }>): void {
   initSync({ module: request.module });
   ({ episode } = request);
-  ({ seed } = request.config);
   const config = JSON.stringify(request.config);
   const { branch } = request;
   live = branch
@@ -158,10 +158,29 @@ function advance({ frames, viewPx, input }: Extract<Request, { type: "advance" }
   send({ type: "live", state, view }, [view.rgba.buffer]);
 }
 
-onmessage = (event: MessageEvent<Request>) => {
-  try {
-    answer(event.data);
-  } catch (problem) {
-    send({ type: "error", message: problem instanceof Error ? problem.message : String(problem) });
+/** Describes a problem; a trap of the module is a bug. */
+function described(problem: unknown): string {
+  if (problem instanceof WebAssembly.RuntimeError) {
+    return `the simulator has stopped (${problem.message}). This is a bug in chaic; please report it`;
   }
-};
+  return problem instanceof Error ? problem.message : String(problem);
+}
+
+/** Runs a task and reports its problem. */
+function run(task: () => void): void {
+  try {
+    // The state of the module is undefined after a trap.
+    if (trap) throw trap;
+    task();
+  } catch (problem) {
+    if (problem instanceof WebAssembly.RuntimeError) trap = problem;
+    send({ type: "error", message: described(problem) });
+  }
+}
+
+/** Runs a task after the requests that wait. */
+function later(task: () => void): void {
+  setTimeout(() => run(task));
+}
+
+onmessage = (event: MessageEvent<Request>) => run(() => answer(event.data));

@@ -217,7 +217,7 @@ pub trait Policy: Send + 'static {
     fn reset(&mut self, briefing: &Briefing);
 
     /// Returns the plan to execute next. `valid` is never empty; plans of one kind are sorted by
-    /// distance, nearest first.
+    /// distance, nearest first. [`Plan::LiftWith`] is sorted by track.
     ///
     /// # Errors
     /// If the policy cannot choose; the agent then takes no decision.
@@ -291,7 +291,8 @@ pub trait Policy: Send + 'static {
     }
 }
 
-/// Returns all plans that can be started now, plans of one kind sorted by distance. Never empty.
+/// Returns all plans that can be started now, plans of one kind sorted by distance, and
+/// [`Plan::LiftWith`] by track. Never empty.
 pub fn valid_plans(memory: &Memory, briefing: &Briefing) -> Vec<Plan> {
     let hands = HandState::new(&memory.hands, briefing);
     let mut plans = vec![Plan::Explore];
@@ -338,7 +339,7 @@ fn reachable<'a>(
     found.into_iter().map(|(_, t)| Subject::from_object(t))
 }
 
-/// Returns the furniture that the partner stands beside.
+/// Returns the furniture that the partner stands beside, in the order of tracks.
 fn furniture_at_partner<'a>(
     memory: &'a Memory,
     briefing: &Briefing,

@@ -79,7 +79,7 @@ pub struct Executor {
     plan_start: Frame,
     n_turns: u32,
     n_lifts: u32,
-    /// Frame from which the followed person has been near.
+    /// Frame of this plan in which the followed person was first near.
     near_since: Option<Frame>,
     /// Goal place of the current delivery.
     place: Option<TrackId>,

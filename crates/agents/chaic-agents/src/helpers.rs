@@ -60,7 +60,7 @@ pub static HELPERS: [HelperInfo; 11] = [
         name: "infer",
         title: "Infer",
         about: "infers goal and person, then plans for both",
-        make: |rules, factory| Box::new(infer(rules, factory, InferOptions::ALL)),
+        make: |rules, factory| Box::new(infer(rules, factory, InferOptions::ALL, false)),
         grants: planner_grants,
     },
     HelperInfo {
@@ -69,7 +69,7 @@ pub static HELPERS: [HelperInfo; 11] = [
         about: "infer that does not follow the partner",
         make: |rules, factory| {
             let options = InferOptions { follows_partner: false, ..InferOptions::ALL };
-            Box::new(infer(rules, factory, options))
+            Box::new(infer(rules, factory, options, false))
         },
         grants: planner_grants,
     },
@@ -79,7 +79,7 @@ pub static HELPERS: [HelperInfo; 11] = [
         about: "infer that follows the oracle's rules",
         make: |rules, factory| {
             let options = InferOptions { uses_team_planner: false, ..InferOptions::ALL };
-            Box::new(infer(rules, factory, options))
+            Box::new(infer(rules, factory, options, false))
         },
         grants: planner_grants,
     },
@@ -89,7 +89,7 @@ pub static HELPERS: [HelperInfo; 11] = [
         about: "infer that assumes an unimpaired adult",
         make: |rules, factory| {
             let options = InferOptions { infers_constraint: false, ..InferOptions::ALL };
-            Box::new(infer(rules, factory, options))
+            Box::new(infer(rules, factory, options, false))
         },
         grants: planner_grants,
     },
@@ -97,7 +97,7 @@ pub static HELPERS: [HelperInfo; 11] = [
         name: "infer_known_goal",
         title: "Infer, known goal",
         about: "infer with the goal granted",
-        make: |rules, factory| Box::new(infer(rules, factory, InferOptions::ALL)),
+        make: |rules, factory| Box::new(infer(rules, factory, InferOptions::ALL, true)),
         grants: |rules| Grants { goal: true, ..planner_grants(rules) },
     },
     HelperInfo {
@@ -147,13 +147,17 @@ pub fn oracle(rules: PlannerRules, factory: &dyn PerceptionFactory) -> PlanningA
 }
 
 /// Constructs the helper that infers goal and constraint from what it sees, and plans for both.
+/// `knows_goal` tells whether the goal is granted.
 pub fn infer(
     rules: PlannerRules,
     factory: &dyn PerceptionFactory,
     options: InferOptions,
+    knows_goal: bool,
 ) -> PlanningAgent<InferPolicy> {
     let policy = InferPolicy::new(options);
-    let (grants, rules) = (planner_grants(rules), explore_unknown_area(rules));
+    // A perception may withhold the partner's actions, which the agent then recognizes itself.
+    let grants = factory.grants(Grants { goal: knows_goal, ..planner_grants(rules) });
+    let rules = explore_unknown_area(rules);
     PlanningAgent::with_watched(policy, rules, factory, AgentId::PARTNER, grants)
 }
 
@@ -184,7 +188,75 @@ pub fn follow(rules: PlannerRules, factory: &dyn PerceptionFactory) -> PlanningA
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::behavior::{BehaviorLog, BehaviorModel};
+    use crate::memory::Memory;
+    use crate::perception::Perception;
     use crate::perception_factory::GroundTruthPerceptionFactory;
+    use chaic_core::Observation;
+    use chaic_core::observation::{FrameHistorySpec, SensorConfig};
+
+    const HISTORY: FrameHistorySpec =
+        FrameHistorySpec { image_size: 32, every_frames: 3, max_len: 4 };
+
+    /// Perception that withholds the partner's actions, because its model recognizes them.
+    struct Recognition;
+
+    #[derive(Default)]
+    struct RecognitionModel(BehaviorLog);
+
+    impl PerceptionFactory for Recognition {
+        fn name(&self) -> Option<String> {
+            None
+        }
+
+        fn sensors(&self) -> SensorConfig {
+            GroundTruthPerceptionFactory.sensors()
+        }
+
+        fn grants(&self, requested: Grants) -> Grants {
+            Grants { behavior: requested.behavior && requested.goal, ..requested }
+        }
+
+        fn perception(&self) -> Box<dyn Perception> {
+            GroundTruthPerceptionFactory.perception()
+        }
+
+        fn behavior(&self, _: AgentId) -> Option<Box<dyn BehaviorModel>> {
+            Some(Box::new(RecognitionModel::default()))
+        }
+    }
+
+    impl BehaviorModel for RecognitionModel {
+        fn reset(&mut self) {}
+
+        fn frame_history(&self) -> Option<FrameHistorySpec> {
+            Some(HISTORY)
+        }
+
+        fn observe(&mut self, _: &Observation, _: &Memory) {}
+
+        fn log(&self) -> &BehaviorLog {
+            &self.0
+        }
+
+        fn fork(&self) -> Box<dyn BehaviorModel> {
+            Box::new(RecognitionModel(self.0.clone()))
+        }
+    }
+
+    #[test]
+    fn a_helper_recognizes_the_actions_that_its_perception_withholds() {
+        for (name, recognizes) in [("infer", true), ("infer_no_planner", true), ("oracle", false)] {
+            let info = HelperInfo::find_helper(name).unwrap();
+            for rules in [PlannerRules::paper(), PlannerRules::compat()] {
+                let history = (info.make)(rules, &Recognition).sensors().frame_history;
+                assert_eq!(history == Some(HISTORY), recognizes, "{name}");
+            }
+        }
+        let info = HelperInfo::find_helper("infer_known_goal").unwrap();
+        let history = (info.make)(PlannerRules::compat(), &Recognition).sensors().frame_history;
+        assert_eq!(history, None, "with the goal, the actions are granted");
+    }
 
     #[test]
     fn every_name_has_a_helper_with_the_grants_of_its_kind() {

@@ -122,6 +122,15 @@ pub struct PixelTargets<P> {
 }
 
 impl<P: Perception + Clone + 'static> Perception for PixelTargets<P> {
+    fn reset(&mut self, briefing: &Briefing) {
+        self.inner.reset(briefing);
+        self.last.clear();
+    }
+
+    fn update_hands(&mut self, hands: &Hands, last: Option<(Intent, Outcome)>) {
+        self.inner.update_hands(hands, last);
+    }
+
     fn perceive(&mut self, observation: &Observation) -> Percepts {
         let percepts = self.inner.perceive(observation);
         self.last = percepts.detections.iter().map(|d| (d.track, d.pixel)).collect();
@@ -135,6 +144,10 @@ impl<P: Perception + Clone + 'static> Perception for PixelTargets<P> {
 
     fn uses_pixel_targets(&self) -> bool {
         true
+    }
+
+    fn hides_ids(&self) -> bool {
+        self.inner.hides_ids()
     }
 
     fn fork(&self) -> Box<dyn Perception> {

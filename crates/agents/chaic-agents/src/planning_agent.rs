@@ -270,7 +270,6 @@ impl Episode {
                 return Ok(None);
             }
         }
-        self.change_count = change_count;
         if let Some(min_top_m) = policy.goal_place_min_top_m(&self.memory) {
             self.memory.set_goal_place_min_top(min_top_m);
         }
@@ -278,6 +277,8 @@ impl Episode {
         let context = self.context(behavior);
         let valid = valid_plans(&self.memory, &self.briefing);
         let chosen = policy.choose(&context, &valid)?;
+        // Only after a choice: a repeated call must find the same changes.
+        self.change_count = change_count;
         Ok(match self.plan {
             Some(current) if !policy.supersedes(&chosen, &current) => None,
             _ => Some(chosen),

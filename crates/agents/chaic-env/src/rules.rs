@@ -13,7 +13,24 @@ use serde_json::Value;
 use crate::error::{EnvError, Result};
 
 /// Largest duration of a part of an action, frames: over three times an episode of the paper.
-const MAX_DURATION: u64 = 10_000;
+const MAX_DURATION: f32 = 10_000.0;
+/// Largest value of the other rules: the longest horizon of an episode, frames.
+const MAX_VALUE: f32 = 1e6;
+/// Bounds of rules by the end of their names. The first entry that matches applies.
+const RULE_BOUNDS: [(&str, f32, f32); 9] = [
+    // Planners divide by both.
+    ("world.turn_rad", 0.01, std::f32::consts::PI),
+    ("world.stride_m", 0.01, 10.0),
+    // Opening a hand releases the object in its last frame.
+    ("world.durations.open_hand", 1.0, MAX_DURATION),
+    ("world.fall_step_s", 0.001, 0.1),
+    ("world.break_chance_low", 0.0, 1.0),
+    ("world.break_chance_high", 0.0, 1.0),
+    ("planner.child.escape_probability", 0.0, 1.0),
+    // Success probabilities are exp(-delta / alpha) / beta.
+    ("_penalty.alpha", 0.001, MAX_VALUE),
+    ("_penalty.beta", 1.0, MAX_VALUE),
+];
 
 /// Name of a rule set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -109,27 +126,24 @@ impl RuleSet {
         self.with(renamed.as_deref().unwrap_or(setting))
     }
 
-    /// Checks the lengths of a turn and of a step, by which planners divide, and all durations.
+    /// Checks the bounds of all numbers.
     ///
     /// # Errors
     /// One sentence that names the rule and its bounds.
     pub fn check(&self) -> std::result::Result<(), String> {
-        let Rules { turn_rad, stride_m, durations, .. } = self.world;
-        for (name, value, max) in
-            [("turn_rad", turn_rad, std::f32::consts::PI), ("stride_m", stride_m, 10.0)]
-        {
-            if !(0.01..=max).contains(&value) {
-                return Err(format!("`world.{name}` is from 0.01 to {max:.2}"));
-            }
-        }
-        // Opening a hand releases the object in its last frame.
-        if durations.open_hand == 0 {
-            return Err("`world.durations.open_hand` is at least 1".to_owned());
-        }
-        let all = serde_json::to_value(durations).expect("durations have string keys");
-        for (name, frames) in all.as_object().into_iter().flatten() {
-            if frames.as_u64().is_some_and(|frames| frames > MAX_DURATION) {
-                return Err(format!("`world.durations.{name}` is at most {MAX_DURATION}"));
+        let all = self.to_value();
+        for name in rule_names() {
+            let Some(rule) = all.pointer(&format!("/{}", name.replace('.', "/"))) else { continue };
+            let (min, max) = bounds(&name);
+            // Numbers that are not finite are null in JSON.
+            let is_allowed = match rule {
+                Value::Number(value) => {
+                    value.as_f64().is_some_and(|v| (min..=max).contains(&(v as f32)))
+                }
+                other => !other.is_null(),
+            };
+            if !is_allowed {
+                return Err(format!("`{name}` is from {min} to {max}"));
             }
         }
         Ok(())
@@ -137,6 +151,16 @@ impl RuleSet {
 
     fn to_value(self) -> Value {
         serde_json::to_value(self).expect("rules have string keys and finite numbers")
+    }
+}
+
+/// Returns minimum and maximum of a rule that is a number.
+fn bounds(name: &str) -> (f32, f32) {
+    let stated = RULE_BOUNDS.iter().find(|(end, ..)| name.ends_with(end));
+    match stated {
+        Some((_, min, max)) => (*min, *max),
+        None if name.starts_with("world.durations.") => (0.0, MAX_DURATION),
+        None => (0.0, MAX_VALUE),
     }
 }
 

@@ -37,7 +37,7 @@ pub const MAX_TURN_BYTES: usize = 4 << 10;
 pub const MAX_TURN_FRAMES: u32 = 240;
 /// Largest side of a picture, pixels, and step of sides. Helpers see pictures of the largest size.
 pub const VIEW_PX: [u32; 2] = [512, 64];
-/// Turns of one participant. The page asks for at most 15 pictures a second.
+/// Turns of one participant. The page asks for at most 14 pictures a second.
 pub const TURN_RATE: Rate = Rate { burst: 60, per_sec: 20 };
 /// Maximum number of episodes in memory: see the measured size of an episode in docs/studies.md.
 pub const MAX_SESSIONS: usize = 200;

@@ -7,7 +7,7 @@ use chaic_episodes::Episode;
 use wasm_bindgen::prelude::*;
 
 use crate::drawing::{CanvasLabel, DrawnImage, DrawnMap};
-use crate::live::{LiveSession, reference};
+use crate::live::LiveSession;
 use crate::player::ReplayPlayer;
 
 /// Player of one trace.
@@ -191,19 +191,19 @@ impl Live {
         self.session.trace()
     }
 
+    /// Returns the delivered fraction of the goal of this episode (JSON) with a built-in helper and a
+    /// simulated partner, from the start.
+    ///
+    /// # Errors
+    /// If the episode is unreadable or the helper does not exist.
+    pub fn reference_rate(&self, episode: &[u8], helper: &str) -> Result<f64, JsError> {
+        self.session.reference(episode, helper).map_err(error)
+    }
+
     /// Draws what the person sees.
     pub fn view(&self, side_px: u32) -> Picture {
         self.session.draw_view(side_px).into()
     }
-}
-
-/// Returns the delivered fraction of the goal of an episode with a built-in helper.
-///
-/// # Errors
-/// If the episode is unreadable or the helper does not exist.
-#[wasm_bindgen]
-pub fn reference_rate(episode: &[u8], helper: &str, seed: u32) -> Result<f64, JsError> {
-    reference(episode, helper, seed).map_err(error)
 }
 
 /// Plays an episode as in a trace up to a frame, from which on a built-in helper decides. Returns the new

@@ -22,7 +22,7 @@ pub use drawing::{CanvasLabel, DrawnImage, DrawnMap};
 pub use limits::{Limit, TaskObject};
 pub use live::{
     InputLevel, LiveConfig, LiveError, LiveInfo, LiveInput, LiveSession, LiveState, LiveStatus,
-    PERSON, reference,
+    PERSON,
 };
 pub use memory_history::{MemoryState, PlacedObject, RerunInfo};
 pub use player::{DecisionLine, FrameState, PlayerError, ReplayInfo, ReplayPlayer, RerunState};

@@ -22,6 +22,8 @@ use serde::{Deserialize, Serialize};
 use crate::drawing::DrawnImage;
 use crate::timeline::StoryLine;
 
+mod reference;
+
 /// Name in traces of an agent that a person controls.
 pub const PERSON: &str = "human";
 
@@ -260,11 +262,10 @@ impl LiveSession {
         let (helper, seed) = (trace.header.helper.clone(), trace.header.seed);
         let config = LiveConfig { helper, seed, ..config.clone() };
         let header = &trace.header;
-        let others = header.people.iter().filter(|person| person.agent != config.seat);
         let base = EpisodeConfig {
             rules: header.rules,
             appearance: header.appearance,
-            image_size: others.map(|person| person.sensors.image_size).next(),
+            image_size: image_size_of_others(header, config.seat),
             partner: header.partner.as_deref(),
             ..EpisodeConfig::new(&episode, PERSON)
         };
@@ -559,6 +560,12 @@ impl LiveSession {
     }
 }
 
+/// Returns the side of the images of the agents in other seats, pixels; `None` without such agents.
+fn image_size_of_others(header: &Header, seat: AgentId) -> Option<u32> {
+    let mut others = header.people.iter().filter(|person| person.agent != seat);
+    others.next().map(|person| person.sensors.image_size)
+}
+
 /// Returns whether a person in this seat learns of an event: of what its agent does, and of deliveries
 /// if it is the partner.
 fn notices(seat: AgentId, event: &EventKind) -> bool {
@@ -568,21 +575,6 @@ fn notices(seat: AgentId, event: &EventKind) -> bool {
         EventKind::LiftedTogether { .. } | EventKind::Over { .. } => true,
         _ => false,
     }
-}
-
-/// Plays an episode (JSON) with the rule-based partner and a built-in helper, and returns the
-/// delivered fraction of the goal, to which a person compares theirs.
-///
-/// # Errors
-/// If the episode is unreadable, or the helper does not exist.
-pub fn reference(episode: &[u8], helper_name: &str, seed: u32) -> Result<f64, LiveError> {
-    let episode = Episode::parse(episode, "episode")?;
-    let config = EpisodeConfig { seed, ..EpisodeConfig::new(&episode, helper_name) };
-    let helper = find(&BuiltInHelpers, helper_name, config.rules.planner)?;
-    let mut env = Env::new(config, helper)?;
-    env.advance(None)?;
-    let (done, total) = env.world().progress();
-    Ok(if total > 0.0 { done / total } else { 0.0 })
 }
 
 #[cfg(test)]

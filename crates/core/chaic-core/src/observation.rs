@@ -103,6 +103,9 @@ impl SensorConfig {
             let max = SensorConfig::MAX_HISTORY_FRAMES;
             return Err(format!("asks for a frame history of {n} images; it holds at most {max}"));
         }
+        if self.frame_history.is_some_and(|history| history.every_frames == 0) {
+            return Err("asks for a frame history of every 0 frames; it is at least 1".to_owned());
+        }
         Ok(())
     }
 

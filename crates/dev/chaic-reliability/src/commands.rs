@@ -3,15 +3,20 @@
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
 
 use anyhow::{Context as _, Result, bail};
+use chaic_files::TEMPORARY_SUFFIX;
 use chaic_files::faults::{self, FaultKind, FaultPlan, Operation};
 use chaic_sandbox::Launcher;
 
 /// Exit code of a program that panicked.
 const PANICKED: i32 = 101;
+
+/// End of the name of a temporary file with a process id, in lists of operations and in plans. The id
+/// differs in every process.
+const OF_PROCESS: &str = ".PROCESS.tmp";
 
 /// End of a command.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -79,7 +84,7 @@ pub fn run_ok(folder: &Path, arguments: &[&str]) -> Result<Ended> {
 /// File operation of a command.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct FileOperation {
-    /// The file or folder that it changes.
+    /// The file or folder that it changes. Process ids are left out.
     pub path: String,
     /// Number among the operations on this path, from 0.
     pub index: usize,
@@ -116,13 +121,14 @@ pub fn run_chaic(
     arguments: Vec<OsString>,
 ) -> ExitCode {
     if fault.is_some() || log.is_some() {
-        faults::install(fault);
+        let with_id = |plan: FaultPlan| FaultPlan { path: with_process_id(plan.path), ..plan };
+        faults::install(fault.map(with_id));
     }
     let arguments = std::iter::once("chaic".into()).chain(arguments);
     let code = chaic::run(arguments, &Launcher::this_program());
     if let Some(log) = log {
         let text = faults::operations().iter().fold(String::new(), |mut text, record| {
-            let _ = writeln!(text, "{:?}\t{}", record.operation, record.path.display());
+            let _ = writeln!(text, "{:?}\t{}", record.operation, without_process_id(&record.path));
             text
         });
         if let Err(error) = std::fs::write(log, text) {
@@ -131,6 +137,24 @@ pub fn run_chaic(
         }
     }
     ExitCode::from(code)
+}
+
+/// Returns the end of the name of a temporary file of this process.
+fn of_this_process() -> String {
+    format!(".{}{TEMPORARY_SUFFIX}", std::process::id())
+}
+
+/// Replaces the id of this process at the end of a path by [`OF_PROCESS`].
+fn without_process_id(path: &Path) -> String {
+    let text = path.display().to_string();
+    let stem = text.strip_suffix(&of_this_process()).map(|stem| format!("{stem}{OF_PROCESS}"));
+    stem.unwrap_or(text)
+}
+
+/// Replaces [`OF_PROCESS`] at the end of a path by the id of this process.
+fn with_process_id(path: PathBuf) -> PathBuf {
+    let stem = path.to_str().and_then(|text| text.strip_suffix(OF_PROCESS));
+    stem.map(|stem| PathBuf::from(format!("{stem}{}", of_this_process()))).unwrap_or(path)
 }
 
 impl FileOperation {

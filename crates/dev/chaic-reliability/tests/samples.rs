@@ -16,10 +16,11 @@ fn run_ok(arguments: &[&str]) -> String {
 }
 
 #[test]
-fn file_faults_of_a_merge_and_a_seal_leave_no_corrupt_result() {
-    let table = run_ok(&["faults", "merge", "seal", "--every", "60"]);
-    assert_eq!(table.lines().count(), 4, "{table}");
-    assert!(table.lines().skip(2).all(|line| line.contains("| 0 |")), "{table}");
+fn file_faults_of_a_merge_and_of_seals_leave_no_corrupt_result() {
+    let table = run_ok(&["faults", "merge", "seal", "secret", "--every", "60"]);
+    assert_eq!(table.lines().count(), 5, "{table}");
+    let n_failures = |line: &str| line.split('|').nth(4).map(|cell| cell.trim().to_owned());
+    assert!(table.lines().skip(2).all(|line| n_failures(line).as_deref() == Some("0")), "{table}");
 }
 
 #[test]
@@ -44,6 +45,26 @@ fn a_fault_ends_the_command_or_is_one_line() {
     assert_eq!(power.status.code(), Some(86));
     let temporary = std::fs::read(out.join("shopping-0.json.tmp")).expect("a file without content");
     assert!(temporary.is_empty() && !out.join("shopping-0.json").exists());
+}
+
+/// A drawn secret has a temporary file with the id of its process.
+#[test]
+fn a_fault_hits_the_temporary_file_of_its_process() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
+    let (secret, out, log) = (path("s"), path("sealed"), path("operations"));
+    let seal = |options: &[&str]| {
+        let command = ["--", "episodes", "seal", "--task", "shopping", "--n-episodes", "1"];
+        let files = ["--secret", &secret, "--out", &out];
+        reliability(&[&["chaic"][..], options, &command[..], &files[..]].concat())
+    };
+    let temporary = format!("{secret}.PROCESS.tmp");
+    let crashed = seal(&["--fault", "crash-before", "--path", &temporary, "--at", "1"]);
+    assert_eq!(crashed.status.code(), Some(86));
+    assert!(!folder.path().join("s").exists());
+    assert!(seal(&["--log", &log]).status.success());
+    let operations = std::fs::read_to_string(&log).expect("the list of operations");
+    assert!(operations.contains(&format!("Rename\t{temporary}\n")), "{operations}");
 }
 
 #[test]

@@ -15,7 +15,8 @@ pub use tables::{
 };
 pub use tables::{capitalized, interval, number, rounded, shown_interval};
 pub use text_table::TextTable;
-pub use write::{Report, differing_files, write_files};
+pub(crate) use write::UNKNOWN_ENVIRONMENTS;
+pub use write::{Report, csv_text, differing_files, write_files};
 
 use std::fmt;
 use std::str::FromStr;

@@ -64,8 +64,8 @@ pub struct RolloutConfig {
     /// Generators whose episodes take turns: `gen` (as the paper's) and `gen-standard` (as the
     /// standard split).
     pub splits: Vec<String>,
-    /// Partners, which take turns: `rules` or the name of one that deviates from them
-    /// (`chaic list partners`). Validation has the rule-based ones.
+    /// Partners, which take turns: `rules`, a name of `PARTNER_VARIANTS`, `drawn:SEED` or
+    /// `habits:...`. Validation has the rule-based ones.
     pub partners: Vec<String>,
     /// Width and height of all agents' images during training, pixels. Smaller images hide what the
     /// partner takes (docs/learning.md).

@@ -76,9 +76,36 @@ pub fn forward(
     buffers: &mut Im2colBuffers,
 ) {
     let Im2colBuffers { weights: packed, edges, .. } = buffers;
-    let shape = input.shape;
-    pack(arch, weights, kernel, shape.channels, packed);
-    let channels = packed.columns();
+    pack(arch, weights, kernel, input.shape.channels, packed);
+    convolve(arch, input, packed, bias, kernel, out, edges);
+}
+
+/// Convolves maps as [`forward`], with weights of [`pack`].
+///
+/// # Panics
+/// As [`forward`].
+pub(crate) fn forward_packed(
+    arch: Arch,
+    input: TensorView<'_>,
+    packed: &PackedMatrix,
+    bias: Option<&[f32]>,
+    kernel: Kernel,
+    out: &mut [f32],
+    buffers: &mut Im2colBuffers,
+) {
+    convolve(arch, input, packed, bias, kernel, out, &mut buffers.edges);
+}
+
+fn convolve(
+    arch: Arch,
+    input: TensorView<'_>,
+    packed: &PackedMatrix,
+    bias: Option<&[f32]>,
+    kernel: Kernel,
+    out: &mut [f32],
+    edges: &mut Vec<f32>,
+) {
+    let (shape, channels) = (input.shape, packed.columns());
     if kernel == Kernel::POINTWISE {
         let strips = input.data.chunks(STRIP_PIXELS * shape.channels);
         for (strip, out) in strips.zip(out.chunks_mut(STRIP_PIXELS * channels)) {

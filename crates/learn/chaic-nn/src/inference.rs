@@ -45,18 +45,11 @@ impl Inference {
         assert!(!has_unsupported, "inference supports no reshapes, concatenations and attention");
         assert_eq!(parameters.len(), network.n_parameters(), "wrong number of parameters");
         let (segments, is_kept) = segments(network);
-        let mut packed = vec![PackedMatrix::default(); network.layers.len()];
-        for (layer, packed) in network.layers.iter().zip(&mut packed) {
-            if let Layer::Conv { from, weights, kernel, .. } = *layer {
-                let weights = &parameters[network.parameters()[weights].range.clone()];
-                conv::pack(arch, weights, kernel, network.channels_of(from), packed);
-            }
-        }
         Inference {
             arch,
             network: network.clone(),
             parameters: parameters.to_vec(),
-            weights: packed,
+            weights: pack_weights(network, parameters, arch),
             segments,
             is_kept,
             activations: vec![Tensor::default(); network.layers.len()],
@@ -173,6 +166,18 @@ impl Inference {
             }
         }
     }
+}
+
+/// Packs the weights of dense convolutions, by layer; the matrices of other layers are empty.
+pub(crate) fn pack_weights(network: &Network, parameters: &[f32], arch: Arch) -> Vec<PackedMatrix> {
+    let mut packed = vec![PackedMatrix::default(); network.layers.len()];
+    for (layer, packed) in network.layers.iter().zip(&mut packed) {
+        if let Layer::Conv { from, weights, kernel, .. } = *layer {
+            let weights = &parameters[network.parameters()[weights].range.clone()];
+            conv::pack(arch, weights, kernel, network.channels_of(from), packed);
+        }
+    }
+    packed
 }
 
 /// Returns ranges of layers that are computed strip by strip together, and which layers are kept.

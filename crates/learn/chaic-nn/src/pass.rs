@@ -1,11 +1,15 @@
 //! Forward and backward passes for training.
 
+use std::sync::Arc;
+
 use pulp::Arch;
 
 use crate::attention::{Attention, AttentionGrad};
 use crate::conv::{self, Im2colBuffers};
 use crate::depthwise::{self, Padded, Zeros};
 use crate::elementwise::{AddTo, Relu, ReluGrad, downsample, upsample};
+use crate::gemm::PackedMatrix;
+use crate::inference::pack_weights;
 use crate::network::{Layer, Network, Node};
 use crate::norm;
 use crate::tensor::{Shape, Tensor, TensorView};
@@ -14,6 +18,8 @@ use crate::tensor::{Shape, Tensor, TensorView};
 #[derive(Clone, Debug)]
 pub struct Pass {
     arch: Arch,
+    /// Packed weights by layer if the parameters are constant; otherwise empty.
+    packed: Arc<[PackedMatrix]>,
     activations: Vec<Tensor>,
     gradients: Vec<Tensor>,
     im2col: Im2colBuffers,
@@ -34,6 +40,7 @@ impl Pass {
         let n = network.layers.len();
         Pass {
             arch,
+            packed: Arc::default(),
             activations: vec![Tensor::default(); n],
             gradients: vec![Tensor::default(); n],
             im2col: Im2colBuffers::default(),
@@ -44,6 +51,14 @@ impl Pass {
             attention_weights: vec![Vec::new(); n],
             attention_grad: AttentionGrad::default(),
         }
+    }
+
+    /// Creates the buffers for forward passes that all use these parameters. Weights of dense
+    /// convolutions are packed once, and copies share them. Calls with other parameters would still
+    /// use them.
+    pub fn with_constant_parameters(network: &Network, parameters: &[f32], arch: Arch) -> Pass {
+        let packed: Arc<[PackedMatrix]> = pack_weights(network, parameters, arch).into();
+        Pass { packed, ..Pass::new(network, arch) }
     }
 
     /// Divides the rows of the next batches into groups of these sizes; attention layers relate the
@@ -100,8 +115,12 @@ impl Pass {
                 Layer::Input { index } => out.data.copy_from_slice(&inputs[index].data),
                 Layer::Conv { from, weights, bias, kernel, .. } => {
                     let (input, out) = (earlier[from.0].view(), &mut out.data);
-                    let (weights, bias) = (values(weights), bias.map(values));
-                    conv::forward(self.arch, input, weights, bias, kernel, out, &mut self.im2col);
+                    let (arch, bias, buffers) = (self.arch, bias.map(values), &mut self.im2col);
+                    if let Some(packed) = self.packed.get(k) {
+                        conv::forward_packed(arch, input, packed, bias, kernel, out, buffers);
+                    } else {
+                        conv::forward(arch, input, values(weights), bias, kernel, out, buffers);
+                    }
                 }
                 Layer::Depthwise { from, weights, kernel_size } => {
                     let TensorView { data, shape } = earlier[from.0].view();

@@ -166,6 +166,29 @@ fn passes_are_bit_identical_at_every_width() {
     }
 }
 
+#[test]
+fn passes_with_constant_parameters_are_bit_identical() {
+    for ((net, head), first) in [
+        (network_with_strided_layers(), INPUT),
+        (network_with_reshapes(), SMALL),
+        (network_with_inputs(), SMALL),
+        (network_with_attention(), ROWS),
+    ] {
+        let parameters = net.init_parameters(3);
+        let inputs = inputs(&net, first);
+        let inputs: Vec<&Tensor> = inputs.iter().collect();
+        let mut expected = Pass::new(&net, widest());
+        expected.forward_all(&net, &parameters, &inputs);
+        for (name, arch) in widths() {
+            let mut pass = Pass::with_constant_parameters(&net, &parameters, arch);
+            for _ in 0..2 {
+                pass.forward_all(&net, &parameters, &inputs);
+                assert!(pass.activation(head) == expected.activation(head), "{name}");
+            }
+        }
+    }
+}
+
 /// The brightness level (one of five) of each pixel can be learned in a few steps.
 #[test]
 fn a_network_learns() {

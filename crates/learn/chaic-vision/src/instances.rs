@@ -150,7 +150,8 @@ pub struct Segment {
     pub score: f32,
     /// Row-major indices of its pixels at the network's resolution.
     pub pixels: Vec<u32>,
-    /// Median of the predicted centers, in the camera's frame, meters.
+    /// Median of the centers that its largest connected part predicts, in the camera's frame,
+    /// meters.
     pub center: [f32; 3],
 }
 
@@ -168,6 +169,28 @@ pub fn instances(
     let mut pixels = Pixels::new(camera);
     pixels.read(0, &head.data, depth_m);
     pixels.instances(depth_m, config)
+}
+
+/// Two neighboring pixels that show objects.
+#[derive(Clone, Copy, Debug)]
+struct NeighborPair {
+    pixels: [u32; 2],
+    /// Distance between their points, meters.
+    gap_m: f32,
+    /// Distance between their center votes, meters.
+    vote_gap_m: f32,
+    /// Half the largest extent of the smaller class, meters.
+    half_extent_m: f32,
+    has_one_label: bool,
+}
+
+/// Pixels that show objects, and the distances between neighbors. All groupings of an image share
+/// them.
+#[derive(Clone, Debug)]
+pub(crate) struct ObjectPixels {
+    /// Row-major indices in ascending order.
+    pixels: Vec<u32>,
+    pairs: Vec<NeighborPair>,
 }
 
 /// Predictions for the pixels of one image, at the network's resolution.
@@ -234,30 +257,58 @@ impl Pixels {
         found
     }
 
-    /// Groups the pixels into segments, in descending order of size.
-    pub fn segments(&self, config: &InstanceConfig) -> Vec<Segment> {
+    /// Returns the pixels that show objects, with the distances between neighbors.
+    pub(crate) fn object_pixels(&self) -> ObjectPixels {
         let (pixels, half_extents, columns) = (&self.pixels, &self.half_extents, self.columns());
+        let mut objects = ObjectPixels { pixels: Vec::new(), pairs: Vec::new() };
+        for (k, a) in pixels.iter().enumerate().filter(|(_, a)| a.label != BACKGROUND) {
+            objects.pixels.push(k as u32);
+            let left = (k % columns > 0).then(|| k - 1);
+            for other in left.into_iter().chain(k.checked_sub(columns)) {
+                let b = &pixels[other];
+                if b.label == BACKGROUND {
+                    continue;
+                }
+                let [half_a, half_b] = [a, b].map(|pixel| half_extents[usize::from(pixel.label)]);
+                objects.pairs.push(NeighborPair {
+                    pixels: [k as u32, other as u32],
+                    gap_m: distance(a.point, b.point),
+                    vote_gap_m: distance(a.vote, b.vote),
+                    half_extent_m: half_a.min(half_b),
+                    has_one_label: a.label == b.label,
+                });
+            }
+        }
+        objects
+    }
+
+    /// Groups the pixels into segments, in descending order of the size of their largest connected
+    /// part.
+    pub fn segments(&self, config: &InstanceConfig) -> Vec<Segment> {
+        self.segments_among(&self.object_pixels(), config)
+    }
+
+    /// Groups the pixels as [`Pixels::segments`], given the result of [`Pixels::object_pixels`].
+    pub(crate) fn segments_among(
+        &self,
+        objects: &ObjectPixels,
+        config: &InstanceConfig,
+    ) -> Vec<Segment> {
+        let (pixels, half_extents) = (&self.pixels, &self.half_extents);
         let mut parents: Vec<u32> = (0..pixels.len() as u32).collect();
-        let is_connected = |a: &Pixel, b: &Pixel| {
-            if a.label == BACKGROUND || b.label == BACKGROUND {
-                return false;
-            }
-            let half = half_extents[usize::from(a.label)].min(half_extents[usize::from(b.label)]);
-            (a.label == b.label || config.ignores_labels)
-                && distance(a.point, b.point) < config.gap_m.max(config.gap_extents * half)
-                && distance(a.vote, b.vote) < config.center_vote_radius * half
+        let is_connected = |pair: &&NeighborPair| {
+            let half = pair.half_extent_m;
+            (pair.has_one_label || config.ignores_labels)
+                && pair.gap_m < config.gap_m.max(config.gap_extents * half)
+                && pair.vote_gap_m < config.center_vote_radius * half
         };
-        for k in 0..pixels.len() {
-            if k % columns > 0 && is_connected(&pixels[k], &pixels[k - 1]) {
-                union(&mut parents, k, k - 1);
-            }
-            if k >= columns && is_connected(&pixels[k], &pixels[k - columns]) {
-                union(&mut parents, k, k - columns);
-            }
+        for pair in objects.pairs.iter().filter(is_connected) {
+            let [a, b] = pair.pixels;
+            union(&mut parents, a as usize, b as usize);
         }
         let mut parts: Vec<Vec<u32>> = Vec::new();
         let mut part_of = vec![usize::MAX; pixels.len()];
-        for k in (0..pixels.len()).filter(|k| pixels[*k].label != BACKGROUND) {
+        for k in objects.pixels.iter().map(|k| *k as usize) {
             let first = find_root(&mut parents, k);
             if first == k {
                 part_of[k] = parts.len();
@@ -312,21 +363,22 @@ impl Pixels {
             segment.pixels.iter().for_each(|k| segment_of[*k as usize] = n as u16);
         }
         let mut masks = vec![Vec::new(); segments.len()];
-        for (k, depth) in depth_m.iter().enumerate() {
-            let (x, y) = (k % width, k / width);
-            let (i, j) = (x / STRIDE, y / STRIDE);
-            let (right, below) =
-                ((x.div_ceil(STRIDE)).min(columns - 1), (y.div_ceil(STRIDE)).min(rows - 1));
-            let neighbors = [(i, j), (right, j), (i, below), (right, below)];
-            let depth_error =
-                |(i, j): (usize, usize)| (depth + pixels[j * columns + i].point[2]).abs();
-            let first = neighbors[0];
-            let best = neighbors
-                .into_iter()
-                .fold(first, |a, b| if depth_error(b) < depth_error(a) { b } else { a });
-            let segment = segment_of[best.1 * columns + best.0];
-            if let Some(mask) = masks.get_mut(usize::from(segment)) {
-                mask.push(k as u32);
+        for (y, line) in depth_m.chunks_exact(width).enumerate() {
+            let (j, below) = (y / STRIDE, y.div_ceil(STRIDE).min(rows - 1));
+            for (x, depth) in line.iter().enumerate() {
+                let (i, right) = (x / STRIDE, x.div_ceil(STRIDE).min(columns - 1));
+                let neighbors = [(i, j), (right, j), (i, below), (right, below)];
+                let neighbors = neighbors.map(|(i, j)| j * columns + i);
+                let mut segment = segment_of[neighbors[0]];
+                // Depth matters only at the border of a segment.
+                if neighbors.iter().any(|at| segment_of[*at] != segment) {
+                    let depth_error = |at: usize| (depth + pixels[at].point[2]).abs();
+                    let nearer = |a, b| if depth_error(b) < depth_error(a) { b } else { a };
+                    segment = segment_of[neighbors.into_iter().fold(neighbors[0], nearer)];
+                }
+                if let Some(mask) = masks.get_mut(usize::from(segment)) {
+                    mask.push((y * width + x) as u32);
+                }
             }
         }
         masks
@@ -354,7 +406,8 @@ fn decode(
 ) {
     let (width, columns) = (camera.width as usize, camera.width as usize / STRIDE);
     let n_labels = half_extents.len();
-    let (focal, half) = (camera.focal_px(), 0.5 * width as f32);
+    let focal = camera.focal_px();
+    let half = [camera.width, camera.height].map(|n| 0.5 * n as f32);
     let first = pixels.len();
     let rows = head.chunks_exact(n_labels + N_OFFSETS);
     let n = rows.len();
@@ -364,7 +417,7 @@ fn decode(
         let (k, offset) = (first + k, &output[n_labels..]);
         let (x, y) = (STRIDE * (k % columns), STRIDE * (k / columns));
         let depth = depth_m[y * width + x];
-        let (u, v) = (x as f32 + 0.5 - half, y as f32 + 0.5 - half);
+        let (u, v) = (x as f32 + 0.5 - half[0], y as f32 + 0.5 - half[1]);
         let point = [u / focal * depth, -v / focal * depth, -depth];
         let scale = half_extents[usize::from(label)];
         let vote = std::array::from_fn(|axis| point[axis] + scale * offset[axis]);
@@ -446,6 +499,26 @@ mod tests {
 
     use super::*;
     use crate::labels::label_of;
+
+    #[test]
+    fn points_lie_on_the_rays_of_an_image_that_is_not_square() {
+        let camera = Camera {
+            eye_in_world: Vec3::ZERO,
+            world_from_camera: yaw_rotation(0.0),
+            vertical_fov_rad: Camera::EYE_FOV_RAD,
+            width: 8,
+            height: 4,
+        };
+        let mut pixels = Pixels::new(&camera);
+        let head = vec![0.0; 8 * (half_extents_m().len() + N_OFFSETS)];
+        pixels.read(0, &head, &[2.0; 32]);
+        assert_eq!(pixels.pixels().len(), 8);
+        for (k, pixel) in pixels.pixels().iter().enumerate() {
+            let [x, y] = [k % 4, k / 4].map(|n| (STRIDE * n) as u32);
+            let expected = camera.unproject(x, y, 2.0).to_array();
+            assert!(distance(pixel.point, expected) < 1e-4, "{:?} {expected:?}", pixel.point);
+        }
+    }
 
     #[test]
     fn background_seen_through_an_object_is_no_part_of_it() {

@@ -81,11 +81,12 @@ impl Targets {
     pub fn add(&mut self, view: &LabeledView, crop: ImageCrop, config: &LossConfig) {
         let width = view.camera.width as usize;
         let focal = view.camera.focal_px();
-        let center = 0.5 * width as f32;
+        let half = [view.camera.width, view.camera.height].map(|n| 0.5 * n as f32);
         // Points are in the camera's frame: x right, y up, z towards the camera.
         let point = |k: usize| {
             let depth = view.depth_m[k];
-            let (u, v) = ((k % width) as f32 + 0.5 - center, (k / width) as f32 + 0.5 - center);
+            let u = (k % width) as f32 + 0.5 - half[0];
+            let v = (k / width) as f32 + 0.5 - half[1];
             [u / focal * depth, -v / focal * depth, -depth]
         };
         let mut counts = vec![0u32; view.labels.len()];

@@ -58,9 +58,13 @@ pub fn proposals(pixels: &Pixels) -> Vec<Segment> {
     let mut kept: Vec<Segment> = Vec::new();
     // For each grouping, the proposal that owns each pixel.
     let mut owners: Vec<Vec<u16>> = Vec::new();
+    let objects = pixels.object_pixels();
     for config in &GROUPINGS {
+        if kept.len() == MAX_PROPOSALS {
+            break;
+        }
         let mut owner = vec![u16::MAX; n_pixels];
-        for mut segment in pixels.segments(config) {
+        for mut segment in pixels.segments_among(&objects, config) {
             if kept.len() == MAX_PROPOSALS || is_duplicate(&segment, &kept, &owners) {
                 continue;
             }

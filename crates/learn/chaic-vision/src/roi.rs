@@ -94,7 +94,7 @@ pub struct RoiSource<'a> {
 
 impl RoiSource<'_> {
     /// Writes the crop of a proposal, shape [`SIDE`, `SIDE`, `N_CHANNELS`], and its scalars; returns
-    /// the square. Pixels of the proposal are in ascending order.
+    /// the square. Pixels of the proposal are in ascending order: sums over them have one order.
     pub fn write(&self, proposal: &Segment, crop: &mut [f32], scalars: &mut [f32]) -> RoiBox {
         let columns = self.pixels.columns();
         let pixels = self.pixels.pixels();
@@ -103,14 +103,17 @@ impl RoiSource<'_> {
         let camera = self.pixels.camera();
         let depth_m = median_depth(pixels, &proposal.pixels);
         let side_m = STRIDE as f32 * roi.side * depth_m / camera.focal_px();
-        self.write_crop(proposal, roi, depth_m, side_m, crop);
-        self.write_scalars(proposal, [columns, rows], depth_m, scalars);
+        let mut is_member = vec![false; pixels.len()];
+        proposal.pixels.iter().for_each(|k| is_member[*k as usize] = true);
+        self.write_crop(proposal, &is_member, roi, depth_m, side_m, crop);
+        self.write_scalars(proposal, &is_member, [columns, rows], depth_m, scalars);
         roi
     }
 
     fn write_crop(
         &self,
         proposal: &Segment,
+        is_member: &[bool],
         roi: RoiBox,
         depth_m: f32,
         side_m: f32,
@@ -151,8 +154,7 @@ impl RoiSource<'_> {
             sample[..3].copy_from_slice(&mean[..3]);
             sample[3] = (2.0 * relative).clamp(-2.0, 2.0);
             sample[4..8].copy_from_slice(&mean[4..8]);
-            let is_member = proposal.pixels.binary_search(&(at as u32)).is_ok();
-            sample[8] = f32::from(u8::from(is_member));
+            sample[8] = f32::from(u8::from(is_member[at]));
             sample[9] = f32::from(u8::from(label == proposal.label));
             if label != BACKGROUND {
                 let distance = (0..3).map(|axis| {
@@ -170,6 +172,7 @@ impl RoiSource<'_> {
     fn write_scalars(
         &self,
         proposal: &Segment,
+        is_member: &[bool],
         [columns, rows]: [usize; 2],
         depth_m: f32,
         scalars: &mut [f32],
@@ -221,7 +224,7 @@ impl RoiSource<'_> {
                 (y + 1 < rows).then(|| k + columns),
             ];
             for neighbor in neighbors.into_iter().flatten() {
-                if proposal.pixels.binary_search(&(neighbor as u32)).is_ok() {
+                if is_member[neighbor] {
                     continue;
                 }
                 border += 1.0;

@@ -53,12 +53,12 @@ pub struct RoiOutput {
 }
 
 impl SecondStage {
-    /// Creates buffers for inference.
+    /// Creates buffers for inference with the current parameters.
     pub fn pass(&self) -> Pass {
-        Pass::new(&self.network.network, widest())
+        Pass::with_constant_parameters(&self.network.network, &self.parameters, widest())
     }
 
-    /// Runs the network on proposals.
+    /// Runs the network on proposals; `pass` is one of [`SecondStage::pass`].
     pub fn outputs(
         &self,
         source: &RoiSource<'_>,
@@ -196,11 +196,12 @@ pub(crate) fn redrawn_pixels(mask: &[f32], roi: RoiBox, pixels: &Pixels) -> Vec<
         let low = (at as usize).min(SIDE - 2);
         (low, at - low as f32)
     };
+    let positions: Vec<(usize, (usize, f32))> =
+        range(0, columns).map(|x| (x, position(0, x))).collect();
     let mut members = Vec::new();
     for y in range(1, rows) {
         let (j, v) = position(1, y);
-        for x in range(0, columns) {
-            let (i, u) = position(0, x);
+        for (x, (i, u)) in positions.iter().copied() {
             let at = |i: usize, j: usize| mask[j * SIDE + i];
             let upper = at(i, j) + u * (at(i + 1, j) - at(i, j));
             let lower = at(i, j + 1) + u * (at(i + 1, j + 1) - at(i, j + 1));
@@ -223,8 +224,13 @@ fn suppress(candidates: Vec<Candidate>, n_pixels: usize) -> Vec<Candidate> {
         let Segment { label, score, ref pixels, .. } = candidate.segment;
         debug_assert_ne!(label, BACKGROUND);
         let is_same = kept.iter().any(|other| {
+            let (n, n_other) = (pixels.len(), other.segment.pixels.len());
+            // The smaller mask bounds the intersection, and the larger one the union.
+            if n.min(n_other) as f32 <= SUPPRESSION_IOU * n.max(n_other) as f32 {
+                return false;
+            }
             let shared = n_shared(pixels, &other.segment.pixels);
-            let union = pixels.len() + other.segment.pixels.len() - shared;
+            let union = n + n_other - shared;
             shared as f32 > SUPPRESSION_IOU * union as f32
         });
         if is_same {
@@ -256,7 +262,10 @@ fn suppress(candidates: Vec<Candidate>, n_pixels: usize) -> Vec<Candidate> {
 
 /// Number of common elements of two ascending lists.
 pub(crate) fn n_shared(a: &[u32], b: &[u32]) -> usize {
-    let (mut i, mut j, mut n) = (0, 0, 0);
+    let [Some(first_a), Some(first_b)] = [a, b].map(<[u32]>::first) else { return 0 };
+    let mut i = a.partition_point(|k| k < first_b);
+    let mut j = b.partition_point(|k| k < first_a);
+    let mut n = 0;
     while i < a.len() && j < b.len() {
         match a[i].cmp(&b[j]) {
             std::cmp::Ordering::Less => i += 1,
@@ -307,5 +316,7 @@ mod tests {
     fn common_elements_are_counted() {
         assert_eq!(n_shared(&[1, 4, 7], &[0, 4, 5, 7, 9]), 2);
         assert_eq!(n_shared(&[], &[1]), 0);
+        assert_eq!(n_shared(&[1, 2, 8], &[8, 9]), 1);
+        assert_eq!(n_shared(&[5, 6], &[1, 2]), 0);
     }
 }

@@ -67,6 +67,28 @@ fn normals_of_a_wall_face_the_camera_and_of_the_floor_point_up() {
 }
 
 #[test]
+fn features_of_a_crop_are_those_of_the_image() {
+    const SIDE_PX: usize = 32;
+    let camera = camera(SIDE_PX as u32);
+    let mut rng = RngStream::new(1, "image", 0);
+    let depth_m: Vec<f32> = (0..SIDE_PX * SIDE_PX).map(|_| rng.range(-0.5, 9.0)).collect();
+    let rgb: Vec<u8> = (0..3 * SIDE_PX * SIDE_PX).map(|_| rng.below(256) as u8).collect();
+    let features_of = |crop: ImageCrop| {
+        let mut out = vec![0.0; crop.size[0] * crop.size[1] * N_FEATURES];
+        features(&rgb, &depth_m, &camera, crop, &mut out);
+        out
+    };
+    let whole = features_of(ImageCrop::whole(&camera));
+    for origin in [[0, 0], [5, 9], [20, 16]] {
+        let crop = features_of(ImageCrop { origin, size: [12, 16] });
+        for (j, row) in crop.chunks_exact(12 * N_FEATURES).enumerate() {
+            let first = ((origin[1] + j) * SIDE_PX + origin[0]) * N_FEATURES;
+            assert!(row == &whole[first..][..row.len()], "row {j} at {origin:?}");
+        }
+    }
+}
+
+#[test]
 fn labels_cover_the_background_and_all_classes() {
     assert_eq!(label_of(None), BACKGROUND);
     assert_eq!(class_of(BACKGROUND), None);
@@ -240,7 +262,7 @@ fn a_training_writes_a_checkpoint_and_readable_weights() {
 }
 
 #[test]
-fn invalid_images_give_no_detections() {
+fn invalid_images_give_valid_scores() {
     let detector = Detector::new();
     let trained = TrainedDetector::uncalibrated(&detector, &detector.network.init_parameters(1));
     let mut inference = trained.inference();

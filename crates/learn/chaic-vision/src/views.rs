@@ -23,7 +23,8 @@ use crate::structures::instance_ids;
 pub struct ViewConfig {
     /// Side of images, pixels.
     pub size_px: u32,
-    /// Fraction of carriable objects that are replaced by a random carriable class.
+    /// Fraction of carriable objects, obstacles and movable heavy objects that are replaced by a
+    /// random class of the same kind.
     #[serde(alias = "swapped")]
     pub swap_fraction: f32,
     /// Number of objects added to a scene, on top of furniture and on the ground.

@@ -7,7 +7,7 @@
 //!
 //! **What it is not**: exact. Its images depend on the GPU and its driver; the images of
 //! [`chaic_render`] are the reference. No score, trace or digest may use this crate, so neither
-//! `chaic-eval` nor the command `chaic` depends on it. Its callers are training, data collection
+//! `chaic-eval` nor the default build of `chaic` depends on it. Its callers are training, data collection
 //! and visualization. It renders no plan views, applies no limits of sight and reads no files.
 //!
 //! **Invariants**

@@ -105,7 +105,7 @@ impl World {
                 if self.objects_to_put(agent, hand).is_empty() {
                     return Err(FailureReason::HandEmpty);
                 }
-                if !self.object(place).1.is_resting() || self.outermost(place) != place {
+                if !self.object(place).1.is_resting() {
                     return Err(FailureReason::Impossible);
                 }
                 let uses_both = self.holds_furniture(agent).is_some();

@@ -155,7 +155,8 @@ impl BlockIndex {
             let (nearest, inside) = block.nearest_in_plan(Vec3::new(at.x, 0.0, at.y));
             let away = at - to_xz(nearest);
             let distance = away.length();
-            if inside {
+            // Rounding can put a point on the edge of a turned box, but not inside.
+            if inside || distance == 0.0 {
                 let (out, depth) = shortest_way_out(block, at);
                 deepest = deepest.max(depth + body.radius_m);
                 at += out * (depth + body.radius_m);
@@ -257,6 +258,20 @@ mod tests {
             let at = index.slide(WALKER, from, from, &[], &[]);
             let expected = to_world(outside[0], outside[1]);
             assert!(at.distance(expected) < 2e-3, "{at} instead of {expected}");
+        }
+    }
+
+    #[test]
+    fn a_body_centered_on_the_edge_of_a_turned_box_has_a_position() {
+        let bounds = Rect::new([-5.0, -5.0], [5.0, 5.0]);
+        for k in 0..400 {
+            let turned =
+                Block { yaw_rad: 0.013 * k as f32, ..block([0.7, 0.5, -0.3], [1.0, 0.5, 0.3]) };
+            let far = Vec3::new(3.0, 0.0, -4.0 + 0.02 * k as f32);
+            let edge = to_xz(turned.nearest_in_plan(far).0);
+            let index = BlockIndex::new(vec![turned], bounds);
+            let at = index.slide(WALKER, edge, edge, &[], &[]);
+            assert!(at.is_finite() && at.distance(edge) < 1.0, "{at} from {edge}");
         }
     }
 

@@ -33,7 +33,7 @@ pub struct Durations {
     /// A short motion that moves the arm away.
     #[serde(alias = "move_away")]
     pub retract_arm: u32,
-    /// Opening a hand.
+    /// Opening a hand; at least 1, because the object is released in its last frame.
     pub open_hand: u32,
     /// Maximum number of extra frames for watching a released object fall.
     #[serde(alias = "watch_fall")]

@@ -13,7 +13,7 @@ use crate::collide::{BlockIndex, Body, Disc};
 use crate::event::{Event, EventKind};
 use crate::rules::{ReachTo, Rules};
 use crate::setup::{AgentSpec, ObjectSpec, Setup, SetupError};
-use crate::shape::{Block, blocks_at, wall_blocks};
+use crate::shape::{Block, blocks_at, blocks_of, wall_blocks};
 use crate::state::{AgentState, ImpairmentState, ObjectLocation, ObjectState, State};
 
 /// An episode in progress.
@@ -396,8 +396,9 @@ fn initial_state(setup: &Setup) -> State {
         released_at: None,
     };
     let mut objects: Vec<ObjectState> = setup.things.iter().map(object_state).collect();
+    let blocks: Vec<Vec<Block>> = setup.things.iter().map(blocks_of).collect();
     for (i, object) in objects.iter_mut().enumerate() {
-        object.location = ObjectLocation::Resting { on: initial_support(setup, i) };
+        object.location = ObjectLocation::Resting { on: initial_support(setup, &blocks, i) };
     }
     State {
         frame: 0,
@@ -420,18 +421,15 @@ fn initial_impairment_states(setup: &Setup) -> Vec<ImpairmentState> {
 }
 
 /// Returns the support of an object at the start: the object whose top is at the height of its
-/// bottom.
-fn initial_support(setup: &Setup, index: usize) -> Option<EntityId> {
+/// bottom. `blocks` holds the collision boxes of each object.
+fn initial_support(setup: &Setup, blocks: &[Vec<Block>], index: usize) -> Option<EntityId> {
     /// Maximum vertical gap for support, meters.
     const TOUCHING_M: f32 = 0.03;
     let p = setup.things[index].position;
     if p.y < TOUCHING_M || !setup.things[index].class.info().is_movable() {
         return None;
     }
-    let below = |t: &ObjectSpec| {
-        let block = crate::shape::blocks_of(t);
-        block.iter().any(|b| (b.y_range()[1] - p.y).abs() < TOUCHING_M && b.nearest_in_plan(p).1)
-    };
-    let others = setup.things.iter().enumerate().filter(|(i, _)| *i != index);
-    others.filter(|(_, t)| below(t)).map(|(i, _)| Setup::entity(i)).next()
+    let touches = |b: &Block| (b.y_range()[1] - p.y).abs() < TOUCHING_M && b.nearest_in_plan(p).1;
+    let mut others = blocks.iter().enumerate().filter(|(i, _)| *i != index);
+    others.find(|(_, boxes)| boxes.iter().any(touches)).map(|(i, _)| Setup::entity(i))
 }

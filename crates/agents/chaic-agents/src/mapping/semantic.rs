@@ -247,7 +247,7 @@ impl SemanticMap {
         self.n_changes
     }
 
-    /// Increases with changes that may affect path costs: new, lost, moved and growing objects.
+    /// Increases with new, missed, lost, moved and growing objects, which may affect path costs.
     pub fn layout_version(&self) -> u32 {
         self.layout_version
     }

@@ -94,8 +94,9 @@ impl Search {
         }
     }
 
-    /// Returns the cheapest 8-connected path from `start` to any goal cell, if it costs at most
-    /// `limit`. No cell is impassable, but occupied cells and walls cost more than any detour.
+    /// Returns an 8-connected path from `start` to any goal cell, if it costs at most `limit`. Its
+    /// cost exceeds the minimum by 1.1 percent at most. No cell is impassable, but occupied cells
+    /// and walls cost more than any detour.
     pub fn a_star(
         &mut self,
         grid: &Grid,
@@ -107,7 +108,8 @@ impl Search {
         self.nodes.start(start);
         self.queue.clear();
         self.queue.push(0, start as u32);
-        // Rounded down, so that the heuristic stays admissible.
+        // A diagonal step costs 14 instead of 14.14 tenths of a straight one, so the estimate of a
+        // diagonal distance is up to 1.02 percent too high.
         let heuristic = |cell: usize| (goal.min_distance_m(cell).max(0.0) * COST_PER_M) as u32;
         while let Some((estimate, cell)) = self.queue.pop() {
             let cell = cell as usize;

@@ -302,6 +302,38 @@ fn a_plan_begins_after_the_thinking_time() {
     }
 }
 
+/// Policy that reconsiders when the map changes, and counts its choices. The second one fails.
+struct HaltingPolicy(u32);
+
+impl Policy for HaltingPolicy {
+    fn reset(&mut self, _: &Briefing) {}
+
+    fn choose(&mut self, _: &Context<'_>, _: &[Plan]) -> Result<Plan, AgentError> {
+        self.0 += 1;
+        match self.0 {
+            2 => Err(AgentError::Halted("no answer".to_owned())),
+            _ => Ok(Plan::TurnAround),
+        }
+    }
+
+    fn reconsiders(&mut self, _: &Context<'_>, _: &Plan, has_changed: bool) -> bool {
+        has_changed
+    }
+}
+
+#[test]
+fn a_failed_choice_is_repeated_by_the_next_call() {
+    let mut toy = Toy::room(6.0, 6.0);
+    toy.stand([0.0, 0.0], 0.0);
+    let mut agent = PlanningAgent::new(HaltingPolicy(0), PlannerRules::paper());
+    agent.reset(&toy.briefing());
+    assert_eq!(agent.act(&toy.observe()).unwrap(), Action::TurnLeft);
+    toy.add(ToyObject::new("apple", [0.0, 0.5, -2.0], [0.2, 0.2, 0.2]));
+    assert!(agent.act(&toy.observe()).is_err());
+    assert_eq!(agent.next_action().unwrap(), Action::TurnLeft);
+    assert_eq!(agent.policy().0, 3);
+}
+
 /// Policy that only chooses plans that cannot be executed.
 struct ImpossiblePolicy;
 

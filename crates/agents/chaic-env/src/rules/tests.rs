@@ -34,6 +34,13 @@ fn a_wrong_setting_is_refused_with_the_expected_values() {
         ("world.turn_rad=-0.3", "0.01 to 3.14"),
         ("planner.exploration=nowhere", "frontier"),
         ("world.failed_put_on_can_deliver=1", "false"),
+        ("world.durations.open_hand=0", "1 to 10000"),
+        ("world.durations.reach=10001", "0 to 10000"),
+        ("world.pick_penalty.beta=0", "1 to 1000000"),
+        ("world.break_chance_low=1.5", "0 to 1"),
+        ("planner.failures.ignore_frames=4294967295", "0 to 1000000"),
+        ("planner.pick_within_m=1e39", "0 to 1000000"),
+        ("planner.put_within_m=-1", "0 to 1000000"),
     ] {
         let error = RuleSet::PAPER.with(setting).expect_err(setting).to_string();
         assert!(error.contains(setting) && error.contains(expected), "{error}");

@@ -5,6 +5,7 @@ use chaic_episodes::find_episode;
 
 use chaic_env::continue_with;
 use chaic_env::helper_registry::built_in_partner;
+use chaic_env::rules::RuleSet;
 
 use super::*;
 use crate::player::tests::verified;
@@ -195,15 +196,20 @@ fn a_branch_has_the_image_size_and_the_partner_of_its_trace() {
     let bytes = episode();
     let episode = Episode::parse(&bytes, "episode").unwrap();
     let name = "habits:load=1";
-    let config_of_run = EpisodeConfig {
-        image_size: Some(128),
-        partner: Some(name),
-        ..EpisodeConfig::new(&episode, "rhp")
+    let start = |partner: Option<&str>| {
+        let config_of_run = EpisodeConfig {
+            seed: 1,
+            rules: RuleSet::COMPAT,
+            image_size: Some(128),
+            partner,
+            ..EpisodeConfig::new(&episode, "rhp")
+        };
+        let rules = config_of_run.rules.planner;
+        let partner = partner.and_then(|name| built_in_partner(name, rules));
+        let agents = EpisodeAgents::new(BuiltInHelpers.make("rhp", rules), partner);
+        Env::new(config_of_run, agents).unwrap()
     };
-    let rules = config_of_run.rules.planner;
-    let agents =
-        EpisodeAgents::new(BuiltInHelpers.make("rhp", rules), built_in_partner(name, rules));
-    let mut env = Env::new(config_of_run, agents).unwrap();
+    let mut env = start(Some(name));
     let mut trace = env.header().to_line() + "\n";
     let mut sink = |record: &Record| -> Result<(), AgentError> {
         trace += &(record.to_line() + "\n");
@@ -212,8 +218,13 @@ fn a_branch_has_the_image_size_and_the_partner_of_its_trace() {
     env.run(&std::sync::atomic::AtomicBool::new(false), Some(400), &mut sink).unwrap();
     for seat in [AgentId::PARTNER, AgentId::HELPER] {
         let config = config(seat, InputLevel::Plans, "none");
-        let branch = LiveSession::take_over(trace.as_bytes(), &bytes, 350, &config);
-        assert_eq!(branch.unwrap().state().frame, 350);
+        let mut branch = LiveSession::take_over(trace.as_bytes(), &bytes, 350, &config).unwrap();
+        assert_eq!(branch.state().frame, 350);
+        // The person is compared with simulated agents under the same rules, with the same seed.
+        let mut simulated = start(Some(name).filter(|_| seat == AgentId::HELPER));
+        simulated.advance(None).unwrap();
+        let (delivered, wanted) = simulated.world().progress();
+        assert_eq!(branch.reference(&bytes, "rhp").unwrap(), delivered / wanted, "{seat}");
         let unknown = trace.replacen(name, "policy:0", 1);
         let refused = LiveSession::take_over(unknown.as_bytes(), &bytes, 350, &config).err();
         let is_refused = matches!(refused, Some(LiveError::NoPartner(_)));
@@ -247,9 +258,11 @@ fn helpers_with_weights_and_other_seats_are_refused() {
         Some(LiveError::Env(EnvError::UnknownHelper { .. }))
     ));
     assert!(matches!(start(AgentId::CHILD, "none"), Some(LiveError::NoSeat(_))));
+    let config = config(AgentId::HELPER, InputLevel::Plans, "none");
+    let session = LiveSession::start(&episode(), &config, &BuiltInHelpers).unwrap();
     assert!(matches!(
-        reference(&episode(), "rl", 0),
+        session.reference(&episode(), "rl"),
         Err(LiveError::Env(EnvError::UnknownHelper { .. }))
     ));
-    assert!(reference(&episode(), "none", 0).unwrap() > 0.0);
+    assert!(session.reference(&episode(), "none").unwrap() > 0.0);
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use chaic_core::TaskId;
 use chaic_eval::metrics::{HelperResults, Interval, MeanRate, Score, mean_rate};
-use chaic_eval::report::{RecordedGrants, title};
+use chaic_eval::report::{RecordedGrants, csv_text, title};
 use serde::Serialize;
 
 use super::{ConfirmedEntry, LeaderboardTable};
@@ -174,13 +174,5 @@ pub(super) fn csv_line(number: usize, table: &LeaderboardTable, row: &Leaderboar
         difference(|d| d.p),
         difference(|d| d.p_holm),
     ];
-    cells.map(|cell| quoted(&cell)).join(",") + "\n"
-}
-
-/// Returns a cell of comma-separated values (RFC 4180).
-fn quoted(cell: &str) -> String {
-    if cell.contains([',', '"', '\n', '\r']) {
-        return format!("\"{}\"", cell.replace('"', "\"\""));
-    }
-    cell.to_owned()
+    cells.map(|cell| csv_text(&cell)).join(",") + "\n"
 }

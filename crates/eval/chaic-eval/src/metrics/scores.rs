@@ -91,7 +91,7 @@ impl Scores {
     }
 
     /// Returns the helpers that were played or planned: `none` and the built-in ones in the paper's
-    /// order, then others by name.
+    /// order, then others by name, and `oracle` last.
     pub fn helpers(&self) -> Vec<String> {
         let played = self.tasks.values().flat_map(|h| h.keys());
         let present: BTreeSet<&String> =

@@ -43,7 +43,9 @@ struct Escape {
 impl Escape {
     fn add_decision(&mut self, frame: Frame) {
         if self.is_running && self.is_away {
-            self.frames += frame - self.last_decision;
+            // An altered trace may not be in order.
+            let frames = frame.saturating_sub(self.last_decision);
+            self.frames = self.frames.saturating_add(frames);
         }
         self.last_decision = frame;
     }
@@ -51,7 +53,8 @@ impl Escape {
     /// Returns all counted frames, including the frames from the last decision to the end, wherever
     /// the child is then.
     fn total(&self, end: Frame) -> u32 {
-        self.frames + if self.is_running { end - self.last_decision } else { 0 }
+        let last = if self.is_running { end.saturating_sub(self.last_decision) } else { 0 };
+        self.frames.saturating_add(last)
     }
 }
 
@@ -170,5 +173,7 @@ mod tests {
         assert_eq!(decide(90, true, true), (20, 130));
         assert_eq!(decide(120, false, true), (50, 50));
         assert_eq!(decide(150, false, true), (50, 50), "on the way back");
+        assert_eq!(decide(160, true, true), (50, 90));
+        assert_eq!(decide(100, true, true), (50, 150), "an altered trace goes back in time");
     }
 }

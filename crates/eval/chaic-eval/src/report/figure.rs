@@ -44,7 +44,13 @@ fn convert_error(error: FigureError) -> EvalError {
 fn bars(scores: &Scores, labels: Labels<'_>) -> Bars {
     let tasks = scores.tasks();
     let bars = |helper: &String| {
-        let bar = |s: &Score| Bar { mean: s.tr, interval: shown_interval(s), dot: None };
+        // The interval is of sums over environments. Equal rates give it no width, and its rounding
+        // may then differ from that of the mean.
+        let with_mean = |[low, high]: [f64; 2], mean: f64| [low.min(mean), high.max(mean)];
+        let bar = |s: &Score| {
+            let interval = shown_interval(s).map(|ends| with_mean(ends, s.tr));
+            Bar { mean: s.tr, interval, dot: None }
+        };
         let is_incomplete = tasks.iter().any(|t| {
             scores.is_unplayed(*t, helper) || scores.get(*t, helper).is_some_and(|s| s.incomplete)
         });

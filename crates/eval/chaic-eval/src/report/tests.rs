@@ -261,6 +261,42 @@ fn language_helpers_with_a_behavior_network_are_named_as_in_the_paper() {
 }
 
 #[test]
+fn the_csv_has_as_many_cells_as_columns_with_a_behavior_network() {
+    let name = "learned 4567, behavior learned 0123";
+    let perception = [("rhp".to_owned(), name.to_owned())].into();
+    let granted = RunGrants { perception, ..granted(Grants::NONE) };
+    let csv = text_with(&results(), Some(&granted), Format::Csv);
+    assert!(csv.contains(&format!(",rhp,ids,\"{name}\",")), "{csv}");
+    let n_columns = csv.lines().next().unwrap().split(',').count();
+    for line in csv.lines() {
+        let unquoted = line.replace(&format!("\"{name}\""), name.split(',').next().unwrap());
+        assert_eq!(unquoted.split(',').count(), n_columns, "{line}");
+    }
+}
+
+#[test]
+fn a_figure_shows_equal_rates_whose_sums_are_rounded() {
+    let results = results();
+    let run_options = options();
+    let report = Report {
+        version: CHAIC_VERSION,
+        options: &run_options,
+        results: &results,
+        planned: &[],
+        granted: None,
+        formulas: FormulaSet::Paper,
+    };
+    let mut scores = report.scores();
+    for score in scores.tasks.values_mut().flat_map(|row| row.values_mut()) {
+        // The mean of rates and that of environments differ in the last bit.
+        (score.tr, score.environments) = (0.3, 3);
+        score.tr_ci = Some([0.3_f64.next_up(); 2]);
+    }
+    let dir = tempfile::tempdir().unwrap();
+    write_figure(&scores, report.labels(), &dir.path().join("figure.svg")).unwrap();
+}
+
+#[test]
 fn failed_runs_are_listed() {
     let mut results = results();
     let message = "the episode broke down: boom".to_owned();

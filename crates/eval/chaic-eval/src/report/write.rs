@@ -26,6 +26,11 @@ use crate::run::{EpisodeJob, RunFolder, RunGrants, RunOptions, environments};
 /// File name of the figure as PNG.
 const FIGURE_PNG: &str = "figure.png";
 
+/// Note of a report without the environments of its episodes.
+pub(crate) const UNKNOWN_ENVIRONMENTS: &str = "\
+    Environments unknown, as the episodes are gone: each counts as independent, so standard errors \
+    and intervals may be too small.";
+
 /// Input of a report.
 #[derive(Clone, Copy, Debug)]
 pub struct Report<'a> {
@@ -57,7 +62,11 @@ impl Report<'_> {
 
     /// Returns the paired differences of the transport rate between all helpers.
     pub fn differences(&self) -> Vec<Difference> {
-        differences(self.played_episodes(&self.plan()), &self.scores().helpers())
+        self.differences_of(&self.scores())
+    }
+
+    fn differences_of(&self, scores: &Scores) -> Vec<Difference> {
+        differences(self.played_episodes(&self.plan()), &scores.helpers())
     }
 
     /// Returns the smallest difference that all tasks together distinguish from zero; `None` if no
@@ -73,19 +82,18 @@ impl Report<'_> {
 
     /// Returns notes about missing or unequal episode runs; empty for a complete run.
     pub fn notes(&self) -> Vec<String> {
-        let text = "Environments unknown, as the episodes are gone: each counts as independent, so \
-                       standard errors and intervals may be too small.";
-        let unknown = self.planned.is_empty().then(|| text.to_owned());
+        let unknown = self.planned.is_empty().then(|| UNKNOWN_ENVIRONMENTS.to_owned());
         coverage(self.played_episodes(&self.plan())).into_iter().chain(unknown).collect()
     }
 
     /// Formats the report; the text ends with a line break.
     pub fn text(&self, format: Format) -> String {
+        let scores = self.scores();
         match format {
-            Format::Table => self.terminal(),
-            Format::Markdown => self.markdown(),
-            Format::Csv => self.csv(),
-            Format::Json => self.json(),
+            Format::Table => self.terminal(&scores),
+            Format::Markdown => self.markdown(&scores),
+            Format::Csv => self.csv(&scores),
+            Format::Json => self.json(&scores),
         }
     }
 
@@ -99,7 +107,7 @@ impl Report<'_> {
         PlayedEpisodes { results: self.results, planned: keys, environments }
     }
 
-    fn json(&self) -> String {
+    fn json(&self, scores: &Scores) -> String {
         #[derive(Serialize)]
         struct File<'a> {
             /// Absent if the run's episodes are missing.
@@ -115,7 +123,7 @@ impl Report<'_> {
             #[serde(skip_serializing_if = "Option::is_none")]
             partner: Option<RecordedGrants>,
             #[serde(flatten)]
-            scores: Scores,
+            scores: &'a Scores,
         }
         #[derive(Serialize)]
         struct EpisodeRuns {
@@ -134,7 +142,7 @@ impl Report<'_> {
         });
         let incomplete = !missing.is_empty();
         missing.truncate(MAX_NAMED);
-        let (labels, scores) = (self.labels(), self.scores());
+        let labels = self.labels();
         let helpers = labels.helper_grants(&self.options.helpers);
         let partner = labels.partner_grants();
         let track = Some(self.options.track).filter(|track| *track != Track::default());
@@ -151,13 +159,12 @@ impl Report<'_> {
         tables
     }
 
-    fn terminal(&self) -> String {
-        let scores = self.scores();
-        let differences = self.differences();
-        let mut tables = self.tables(&scores);
+    fn terminal(&self, scores: &Scores) -> String {
+        let differences = self.differences_of(scores);
+        let mut tables = self.tables(scores);
         tables.extend(resolutions(&differences, &scores.tasks()));
         let mut text: String = tables.iter().map(|t| t.to_terminal() + "\n").collect();
-        text += &self.legend(&scores);
+        text += &self.legend(scores);
         text += &self.notes().iter().map(|n| format!("{n}\n")).collect::<String>();
         text += &self.errors();
         text
@@ -181,8 +188,7 @@ impl Report<'_> {
         (!differences.is_empty()).then_some(text)
     }
 
-    fn markdown(&self) -> String {
-        let scores = self.scores();
+    fn markdown(&self, scores: &Scores) -> String {
         let mut text = self.heading();
         let granted = self.labels().sentence(&scores.helpers());
         if let Some(granted) = &granted {
@@ -191,19 +197,19 @@ impl Report<'_> {
         for note in self.notes() {
             let _ = writeln!(text, "**{note}**\n");
         }
-        let differences = self.differences();
-        let mut tables = self.tables(&scores);
-        tables.push(intervals(&scores, self.labels()));
+        let differences = self.differences_of(scores);
+        let mut tables = self.tables(scores);
+        tables.push(intervals(scores, self.labels()));
         if !differences.is_empty() {
             tables.push(pairs(&differences, &scores.tasks(), self.labels(), granted.as_deref()));
         }
         tables.extend(resolutions(&differences, &scores.tasks()));
-        tables.extend(diagnostics(&scores, self.labels()));
+        tables.extend(diagnostics(scores, self.labels()));
         for table in tables {
             text += &table.to_markdown();
             text.push('\n');
         }
-        text += &self.legend(&scores);
+        text += &self.legend(scores);
         text += &self.errors();
         text
     }
@@ -235,8 +241,7 @@ impl Report<'_> {
         )
     }
 
-    fn csv(&self) -> String {
-        let scores = self.scores();
+    fn csv(&self, scores: &Scores) -> String {
         let granted = self.labels().helper_grants(&self.options.helpers).unwrap_or_default();
         let names = CSV_VALUES.map(|(name, _)| name).join(",");
         let mut text = format!(
@@ -252,8 +257,9 @@ impl Report<'_> {
                 let Score { episodes, environments, failed, incomplete, .. } = s;
                 let _ = writeln!(
                     text,
-                    "{task},{helper},{grants},{perception},{values},{episodes},{environments},{failed},\
-                     {incomplete}"
+                    "{task},{helper},{grants},{},{values},{episodes},{environments},{failed},\
+                     {incomplete}",
+                    csv_text(perception)
                 );
             }
         }
@@ -329,14 +335,22 @@ fn csv_cell(value: Option<f64>) -> String {
     value.map_or(String::new(), |v| format!("{v:.6}"))
 }
 
+/// Returns a text as a cell of comma-separated values (RFC 4180).
+pub fn csv_text(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) {
+        return format!("\"{}\"", text.replace('"', "\"\""));
+    }
+    text.to_owned()
+}
+
 impl Report<'_> {
     /// Returns the text files of the report by name. Leaves out the figure if it can't show that
     /// many helpers.
-    fn texts(&self) -> Result<Vec<(&'static str, String)>> {
-        let mut texts = vec![("scores.json", self.json()), ("report.md", self.markdown())];
-        let scores = self.scores();
-        if fits_figure(&scores) {
-            texts.push(("figure.svg", figure_text(&scores, self.labels())?));
+    fn texts(&self, scores: &Scores) -> Result<Vec<(&'static str, String)>> {
+        let mut texts =
+            vec![("scores.json", self.json(scores)), ("report.md", self.markdown(scores))];
+        if fits_figure(scores) {
+            texts.push(("figure.svg", figure_text(scores, self.labels())?));
         }
         Ok(texts)
     }
@@ -348,10 +362,10 @@ impl Report<'_> {
 /// # Errors
 /// If a file can't be written.
 pub fn write_files(folder: &RunFolder, report: &Report<'_>) -> Result<()> {
-    for (name, text) in report.texts()? {
+    let scores = report.scores();
+    for (name, text) in report.texts(&scores)? {
         folder.write(name, text.as_bytes())?;
     }
-    let scores = report.scores();
     if fits_figure(&scores) {
         write_figure(&scores, report.labels(), &folder.join(FIGURE_PNG))?;
     }
@@ -370,7 +384,7 @@ pub fn differing_files(
     report: &Report<'_>,
 ) -> Result<(Vec<&'static str>, Vec<&'static str>)> {
     let (mut missing, mut altered) = (Vec::new(), Vec::new());
-    for (name, text) in report.texts()? {
+    for (name, text) in report.texts(&report.scores())? {
         let path = folder.join(name);
         match kind(&path)? {
             EntryKind::Missing => missing.push(name),

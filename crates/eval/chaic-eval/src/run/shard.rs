@@ -114,10 +114,12 @@ pub fn merge(out: &Path, parts: &[PathBuf]) -> Result<Run> {
         EvalError::Options(format!("{} was started by an older version of chaic", first.display()))
     })?;
     let planned = plan::planned(&source, &options)?;
-    let from_parts = results(parts, &planned)?;
+    let folders = parts.iter().map(|part| Ok(RunFolder::read(part)?.0));
+    let folders: Vec<RunFolder> = folders.collect::<Result<_>>()?;
+    let from_parts = results(&folders, &planned)?;
     let is_traced = |result: &RunResult| options.traces && result.summary().is_some();
     for (result, part) in from_parts.iter().filter(|(result, _)| is_traced(result)) {
-        check_trace(&RunFolder::read(part)?.0, &result.key)?;
+        check_trace(part, &result.key)?;
     }
 
     let (folder, _) = RunFolder::lock(out, FolderMode::Merge)?;
@@ -127,8 +129,7 @@ pub fn merge(out: &Path, parts: &[PathBuf]) -> Result<Run> {
         copy(&source, &source.join(COMMANDS), &folder, &folder.join(COMMANDS))?;
     }
     for (result, part) in from_parts.iter().filter(|(result, _)| is_traced(result)) {
-        let (part, _) = RunFolder::read(part)?;
-        copy(&part, &part.trace(&result.key), &folder, &folder.trace(&result.key))?;
+        copy(part, &part.trace(&result.key), &folder, &folder.trace(&result.key))?;
     }
     let results: Vec<RunResult> = from_parts.into_iter().map(|(result, _)| result).collect();
     let lines: String = results.iter().map(|result| to_line(result) + "\n").collect();
@@ -155,15 +156,17 @@ pub(crate) fn reopen_merged(out: &Path, parts: &[PathBuf]) -> Result<Run> {
     let other_run = || EvalError::NotEmpty { path: out.to_owned() };
     let (folder, recorded) = RunFolder::lock(out, FolderMode::Resume)?;
     let (options, granted) = recorded.zip(folder.granted()?).ok_or_else(other_run)?;
+    let mut folders = Vec::with_capacity(parts.len());
     for part in parts {
         let (part, part_options) = RunFolder::read(part)?;
         let is_same = part_options == options && part.granted()?.as_ref() == Some(&granted);
         if !is_same || (options.split == FILES && !plan::same_copies(&part, &folder)?) {
             return Err(other_run());
         }
+        folders.push(part);
     }
     let planned = plan::planned(&folder, &options)?;
-    let mut from_parts = results(parts, &planned)?;
+    let mut from_parts = results(&folders, &planned)?;
     // A journal is read in the order of the keys.
     from_parts.sort_by(|(a, _), (b, _)| a.key.cmp(&b.key));
     let (journal, results, _) = Journal::open(&folder.results(), &planned)?;
@@ -183,11 +186,13 @@ fn check_trace(part: &RunFolder, key: &RunKey) -> Result<()> {
 
 /// Returns the results of all parts in the order of the plan, each with its part. A completed
 /// result replaces a failed one.
-fn results<'p>(parts: &'p [PathBuf], planned: &[EpisodeJob]) -> Result<Vec<(RunResult, &'p Path)>> {
-    let mut found: BTreeMap<RunKey, (RunResult, &Path)> = BTreeMap::new();
+fn results<'p>(
+    parts: &'p [RunFolder],
+    planned: &[EpisodeJob],
+) -> Result<Vec<(RunResult, &'p RunFolder)>> {
+    let mut found: BTreeMap<RunKey, (RunResult, &RunFolder)> = BTreeMap::new();
     for part in parts {
-        let (folder, _) = RunFolder::read(part)?;
-        for result in read_results(&folder.results(), planned)?.0 {
+        for result in read_results(&part.results(), planned)?.0 {
             match found.get(&result.key) {
                 Some((other, _)) if other.summary().is_some() && result.summary().is_none() => {}
                 Some((other, other_part)) if other.summary().is_some() && *other != result => {
@@ -196,8 +201,8 @@ fn results<'p>(parts: &'p [PathBuf], planned: &[EpisodeJob]) -> Result<Vec<(RunR
                         result.key.episode,
                         result.key.helper,
                         result.key.seed,
-                        part.display(),
-                        other_part.display(),
+                        part.path().display(),
+                        other_part.path().display(),
                     )));
                 }
                 _ => {

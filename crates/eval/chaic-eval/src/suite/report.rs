@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::PartnerRun;
 use crate::metrics::{Estimate, HelperRobustness, PartnerGain, PartnerResults, robustness};
-use crate::report::{Format, TextTable, interval, rounded, title};
+use crate::report::{Format, TextTable, UNKNOWN_ENVIRONMENTS, interval, rounded, title};
 use crate::run::environments;
 
 /// Text of an undefined value.
@@ -27,6 +27,9 @@ pub struct Robustness {
     partners: BTreeMap<String, String>,
     /// Robustness by helper, in the order of the run.
     helpers: Vec<HelperRobustness>,
+    /// True if the environments of the episodes are known.
+    #[serde(skip)]
+    has_environments: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -70,6 +73,7 @@ impl Robustness {
             },
             partners: runs.iter().skip(1).map(description).collect(),
             helpers: robustness(&results, &helpers, &environments),
+            has_environments: first.is_some_and(|run| !run.planned.is_empty()),
         }
     }
 
@@ -119,6 +123,10 @@ impl Robustness {
         }
         if broken > 0 {
             let _ = writeln!(text, "Episode runs that broke down and count as zero: {broken}.");
+        }
+        if !self.has_environments {
+            text += UNKNOWN_ENVIRONMENTS;
+            text.push('\n');
         }
         if self.helpers.is_empty() {
             text += "No helper has an episode with the ordinary partner and another one, with and \

@@ -115,12 +115,12 @@ impl TrainedBehavior {
         weights::digest_of(&file_layout(&self.network), &self.all_parameters(), KIND)
     }
 
-    /// Creates buffers for inference.
+    /// Creates buffers for inference with the current parameters.
     pub fn pass(&self) -> Pass {
-        Pass::new(&self.network.network, widest())
+        Pass::with_constant_parameters(&self.network.network, &self.parameters, widest())
     }
 
-    /// Returns the logits of [`CROPS`] crops.
+    /// Returns the logits of [`CROPS`] crops; `pass` is one of [`TrainedBehavior::pass`].
     pub fn outputs(&self, crops: &[PersonCrop], first: usize, pass: &mut Pass) -> BehaviorScores {
         let mut input = Tensor::zeros(BehaviorNetwork::input_shape(1));
         fill_input(crops, &ClipAugmentation::identity(first), &mut input.data);

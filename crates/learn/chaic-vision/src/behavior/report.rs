@@ -99,8 +99,11 @@ pub fn report(
 }
 
 /// Returns the inverse temperature that maximizes the likelihood of the labels, by golden-section
-/// search.
+/// search; 1 if all clips are mixed or there are none.
 pub fn calibrate(clips: &[Clip], outputs: &[BehaviorScores]) -> f32 {
+    if clips.iter().all(|clip| clip.is_mixed) {
+        return 1.0;
+    }
     let loss = |inverse_temperature: f32| -> f64 {
         let clip_loss = |(clip, o): (&Clip, &BehaviorScores)| {
             let p = softmax(&o.map(|x| inverse_temperature * x))[clip.label.index()];

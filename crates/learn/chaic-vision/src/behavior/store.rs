@@ -40,6 +40,9 @@ pub enum StoreError {
     /// The folder holds clips of another configuration.
     #[error("{0} has clips of another configuration; choose another folder, or remove it")]
     Config(PathBuf),
+    /// There are no clips to train on.
+    #[error("the episodes gave no clips to train on; set collect.episodes to a larger number")]
+    Empty,
 }
 
 impl StoreError {

@@ -181,13 +181,26 @@ fn calibration_lowers_overconfident_probabilities() {
     assert!(calibrate(&clips, &[confident, confident]) < 0.3);
     let uncertain = [0.5, 0.0, 0.0, 0.0, 0.0, 0.0];
     assert!(calibrate(&clips[..1], &[uncertain]) > 3.0, "always correct with low confidence");
+    assert_eq!(calibrate(&[], &[]), 1.0);
+}
+
+#[test]
+fn a_training_without_clips_is_refused() {
+    let mixed = synthetic_clips().into_iter().map(|clip| Clip { is_mixed: true, ..clip });
+    for clips in [Vec::new(), mixed.collect()] {
+        let refused =
+            BehaviorTrainer::with_clips(BehaviorTrainingConfig::default(), clips, Vec::new());
+        let problem = refused.err().expect("no batch can be drawn").to_string();
+        assert!(problem.contains("no clips"), "{problem}");
+    }
 }
 
 #[test]
 fn damaged_checkpoints_and_values_out_of_bounds_are_refused() {
     let config =
         BehaviorTrainingConfig { steps: 40, batch_size: 2, ..BehaviorTrainingConfig::default() };
-    let mut trainer = BehaviorTrainer::with_clips(config, synthetic_clips(), synthetic_clips());
+    let mut trainer =
+        BehaviorTrainer::with_clips(config, synthetic_clips(), synthetic_clips()).unwrap();
     refuses_damaged_checkpoints(&mut trainer);
     bounds_every_number::<BehaviorTrainer>();
     assert!(parse_config::<BehaviorTrainer>("shards = 256\nclips = 60").is_err());

@@ -23,7 +23,7 @@ use super::collect::{Collector, Counts, collect};
 use super::config::{COLLECT_BOUNDS, ClipCollectionConfig};
 use super::network::{BehaviorNetwork, BehaviorScores, TrainedBehavior, softmax};
 use super::report::{all_outputs, calibrate, report};
-use super::store::ClipFolder;
+use super::store::{ClipFolder, StoreError};
 use crate::loss::ln;
 use crate::views::DatasetSplit;
 
@@ -173,12 +173,18 @@ pub struct BehaviorTrainer {
 
 impl BehaviorTrainer {
     /// Creates the training before its first step.
+    ///
+    /// # Errors
+    /// If no clip shows a single action. Batches would be empty.
     pub(crate) fn with_clips(
         config: BehaviorTrainingConfig,
         training: Vec<Clip>,
         validation: Vec<Clip>,
-    ) -> BehaviorTrainer {
-        BehaviorTrainer { learner: BehaviorLearner::new(config, training), validation }
+    ) -> Result<BehaviorTrainer, TrainingError> {
+        if training.iter().all(|clip| clip.is_mixed) {
+            return Err(TrainingError::from_data(StoreError::Empty));
+        }
+        Ok(BehaviorTrainer { learner: BehaviorLearner::new(config, training), validation })
     }
 }
 
@@ -230,7 +236,7 @@ impl Trainer for BehaviorTrainer {
         let Some(validation) = validation else { return Ok(None) };
         let training = clips(DatasetSplit::Train).map_err(TrainingError::from_data)?;
         let Some(training) = training else { return Ok(None) };
-        Ok(Some(BehaviorTrainer::with_clips(*config, training, validation)))
+        BehaviorTrainer::with_clips(*config, training, validation).map(Some)
     }
 
     fn check(config: &BehaviorTrainingConfig) -> Result<(), String> {

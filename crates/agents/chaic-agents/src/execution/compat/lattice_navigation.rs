@@ -74,7 +74,7 @@ impl Hysteresis {
 pub struct LatticeNavigator {
     hysteresis: Hysteresis,
     path_state: PathState,
-    /// Path of the last step, for drawings.
+    /// Path of the last step, for drawings; empty if the step followed none.
     path: Vec<usize>,
     /// Working memory of the path search, created on first use.
     search: Option<StraightSearch>,
@@ -82,6 +82,7 @@ pub struct LatticeNavigator {
 
 impl Navigator for LatticeNavigator {
     fn step(&mut self, memory: &mut Memory, destination: &Destination) -> NavigationStep {
+        self.path.clear();
         let (here, yaw) = (memory.position(), memory.pose.yaw_rad);
         let target = destination.nearest_point(here);
         let (costs, _) = memory.costs_and_search();
@@ -133,8 +134,11 @@ impl Navigator for LatticeNavigator {
         &self.path
     }
 
-    /// Does nothing: the path is replanned at every decision, and the hysteresis spans plans.
-    fn reset(&mut self) {}
+    /// Drops only the drawn path: the path is replanned at every decision, and the hysteresis spans
+    /// plans.
+    fn reset(&mut self) {
+        self.path.clear();
+    }
 
     fn needs_recovery(&self) -> bool {
         false
@@ -220,6 +224,23 @@ mod tests {
         let mut step = |d: &Destination| LatticeNavigator::default().step(&mut memory, d);
         assert_eq!(step(&explore), NavigationStep::Act(Action::TurnLeft));
         assert_eq!(step(&interact), NavigationStep::Arrived);
+    }
+
+    #[test]
+    fn no_path_is_drawn_after_arrival_or_a_reset() {
+        let mut memory = before_obstacle(Persona::Adult, AgentId::HELPER);
+        let mut navigator = LatticeNavigator::default();
+        let here = Destination::near(memory.position(), 1.0);
+        for is_reset in [false, true] {
+            let step = navigator.step(&mut memory, &beyond_obstacle());
+            assert!(matches!(step, NavigationStep::Act(_)) && !navigator.path().is_empty());
+            if is_reset {
+                navigator.reset();
+            } else {
+                assert_eq!(navigator.step(&mut memory, &here), NavigationStep::Arrived);
+            }
+            assert!(navigator.path().is_empty());
+        }
     }
 
     #[test]

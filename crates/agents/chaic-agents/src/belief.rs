@@ -26,6 +26,7 @@ pub use evidence::{AttemptKind, Evidence, FailedAttempt, Take};
 pub use goal::GoalBelief;
 pub use observed_walks::ObservedWalks;
 pub use scene::scene_of;
+pub use visibility::is_hidden;
 
 /// Time before the end from which any goal place is used, frames (chosen on
 /// `gen-standard:7000..7010`, like the next two).

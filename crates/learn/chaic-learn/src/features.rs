@@ -205,7 +205,7 @@ impl FeatureEncoder {
             belief.observe(briefing, memory, behavior);
         }
         if let Some(opponent) = &mut self.opponent {
-            opponent.observe(memory, briefing);
+            opponent.observe(memory, briefing, behavior);
         }
     }
 

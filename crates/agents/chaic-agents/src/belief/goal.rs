@@ -39,6 +39,8 @@ pub struct GoalBelief {
     sets: Vec<TargetSet>,
     hypotheses: Vec<Hypothesis>,
     probabilities: Vec<f32>,
+    /// [`Hypothesis::count`] of each possible class: shape [possible, hypotheses].
+    counts: Vec<f32>,
     /// Expected number of objects that are delivered or in the partner's hands, by class.
     secured: BTreeMap<ClassId, f32>,
     wants_everything: bool,
@@ -173,9 +175,23 @@ impl GoalBelief {
         let hypotheses = sets.iter().flat_map(|set| hypotheses_of(*set, &sets, &possible));
         let hypotheses: Vec<Hypothesis> = hypotheses.collect();
         let probabilities = vec![0.0; hypotheses.len()];
+        let count_of = |class: &ClassId| {
+            let class = *class;
+            hypotheses.iter().map(move |h| h.count(class))
+        };
+        let counts = possible.iter().flat_map(count_of).collect();
         let wants_everything = scene == Some(SceneKind::Yard);
         let secured = BTreeMap::new();
-        GoalBelief { granted, possible, sets, hypotheses, probabilities, secured, wants_everything }
+        GoalBelief {
+            granted,
+            possible,
+            sets,
+            hypotheses,
+            probabilities,
+            counts,
+            secured,
+            wants_everything,
+        }
     }
 
     /// Replaces the posterior by that of the evidence. The constraint determines which objects the
@@ -215,7 +231,10 @@ impl GoalBelief {
         match &self.granted {
             Some(granted) => f32::from(u8::from(granted.count(class) > 0)),
             None if !self.possible.contains(&class) => 0.0,
-            None => self.sum(|h| h.count(class) > 0.0),
+            None => {
+                let wanted = self.counts_of(class).filter(|(count, _)| *count > 0.0);
+                wanted.map(|(_, p)| p).sum::<f32>().min(1.0)
+            }
         }
     }
 
@@ -234,10 +253,7 @@ impl GoalBelief {
         match &self.granted {
             Some(granted) => missing(granted.count(class) as f32),
             None if !self.possible.contains(&class) => 0.0,
-            None => {
-                let each = self.hypotheses.iter().zip(&self.probabilities);
-                each.map(|(h, p)| p * missing(h.count(class))).sum()
-            }
+            None => self.counts_of(class).map(|(count, p)| p * missing(count)).sum(),
         }
     }
 
@@ -289,6 +305,15 @@ impl GoalBelief {
     /// Returns whether all possible targets are wanted, as in a yard.
     pub fn wants_everything(&self) -> bool {
         self.wants_everything
+    }
+
+    /// Returns the expected number of wanted objects of a class and the probability, for each
+    /// hypothesis; nothing for a class that is no possible target.
+    fn counts_of(&self, class: ClassId) -> impl Iterator<Item = (f32, f32)> {
+        let n = self.hypotheses.len();
+        let row = self.possible.iter().position(|possible| *possible == class);
+        let counts = row.map_or(&[][..], |row| &self.counts[row * n..(row + 1) * n]);
+        counts.iter().copied().zip(self.probabilities.iter().copied())
     }
 
     fn sum(&self, is: impl Fn(&Hypothesis) -> bool) -> f32 {

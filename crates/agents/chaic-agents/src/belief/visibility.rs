@@ -15,7 +15,7 @@ pub(super) fn is_at_rest(object: &MappedObject, now: Frame) -> bool {
 }
 
 /// Returns whether a wall stands between a person and an object.
-pub(super) fn is_hidden(memory: &Memory, from: Vec2, to: Vec2) -> bool {
+pub fn is_hidden(memory: &Memory, from: Vec2, to: Vec2) -> bool {
     let grid = memory.map.grid();
     grid.line(from, to).any(|cell| {
         memory.map.state(cell) == CellOccupancy::Wall

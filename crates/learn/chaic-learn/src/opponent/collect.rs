@@ -358,7 +358,7 @@ impl<P: Policy> Policy for RecordingPolicy<P> {
 
     fn observe(&mut self, _: &Observation, memory: &Memory, behavior: &BehaviorLog) {
         let Some(briefing) = &self.briefing else { return };
-        self.window.add(memory, briefing);
+        self.window.add(memory, briefing, behavior);
         let reported = *self.truth.partner_plan.lock().unwrap_or_else(PoisonError::into_inner);
         let Some(ReportedPlan { plan, waits_until }) = reported else { return };
         let plan = if memory.frame < waits_until { Plan::Wait } else { plan };
@@ -385,9 +385,9 @@ const GRANTED: &str = "granted";
 /// Maximum size of a file of windows, bytes.
 const MAX_BYTES: u64 = 1 << 33;
 
-/// Writes windows as a safetensors file with one row per window: `state` (44 features),
+/// Writes windows as a safetensors file with one row per window: `state` (55 features),
 /// `n_choices`, `goal` (by [`OpponentGoal::index`]), `target` (candidate index or -1), `limits`
-/// (5), `episode`. The rows of `choices` (31 features) are the candidates of all windows in order.
+/// (5), `episode`. The rows of `choices` (38 features) are the candidates of all windows in order.
 ///
 /// The metadata `granted` says whether the partner's actions were granted, so that a model is not
 /// trained or evaluated with the wrong ones.

@@ -13,7 +13,7 @@ use crate::candidate_scorer::{CandidateScorer, CandidateSet};
 pub const N_GOALS: usize = OpponentGoal::ALL.len();
 
 /// Kinds in weights files, without and with the partner's actions granted.
-const KINDS: [&str; 2] = ["chaic opponent model 2", "chaic opponent model 2, granted"];
+const KINDS: [&str; 2] = ["chaic opponent model 3", "chaic opponent model 3, granted"];
 /// Name of the opponent model's parameters among those of a policy.
 pub(crate) const OPPONENT: &str = "opponent";
 /// Width of the hidden layers.
@@ -53,8 +53,8 @@ impl OpponentInput {
     pub(crate) fn kind_suffix(self) -> &'static str {
         match self {
             OpponentInput::None => "",
-            OpponentInput::Observed => ", opponent model 2",
-            OpponentInput::Granted => ", granted opponent model 2",
+            OpponentInput::Observed => ", opponent model 3",
+            OpponentInput::Granted => ", granted opponent model 3",
         }
     }
 }

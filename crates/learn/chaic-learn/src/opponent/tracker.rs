@@ -30,8 +30,8 @@ impl OpponentTracker {
     }
 
     /// Adds an observation, after the memory has.
-    pub fn observe(&mut self, memory: &Memory, briefing: &Briefing) {
-        self.history.add(memory, briefing);
+    pub fn observe(&mut self, memory: &Memory, briefing: &Briefing, behavior: &BehaviorLog) {
+        self.history.add(memory, briefing, behavior);
     }
 
     /// Predicts goal, target and limits of the partner from the last observations.

@@ -4,6 +4,7 @@
 use std::collections::{BTreeMap, VecDeque};
 
 use chaic_agents::behavior::BehaviorLog;
+use chaic_agents::belief::Belief;
 use chaic_agents::mapping::MappedObject;
 use chaic_agents::memory::Memory;
 use chaic_agents::track::{Intent, TrackId};
@@ -12,6 +13,8 @@ use chaic_core::geom::{horizontal_distance, to_xz};
 use chaic_core::{Action, AgentId, Briefing, ClassId, Frame, Role, Vec3};
 
 use super::is_pickable;
+use super::walk::{PartnerWalk, goal_places, resting_objects};
+use super::walk_features::{NEAR_SCALE_M, WALK_CLASS_FEATURES, WALK_STATE_FEATURES, WalkFeatures};
 use crate::candidate_scorer::CandidateSet;
 use crate::scales::{TARGET_SETS, TIME_SCALE_FRAMES, flag, log_mass, normalize_clamped, recency};
 
@@ -94,12 +97,10 @@ pub const CLASS_FEATURES: [&str; 23] = [
 ];
 
 /// Number of state features.
-pub const N_STATE: usize = STATE_FEATURES.len();
+pub const N_STATE: usize = STATE_FEATURES.len() + WALK_STATE_FEATURES.len();
 /// Number of class features.
-pub const N_CLASS: usize = CLASS_FEATURES.len() + TARGET_SETS.len();
+pub const N_CLASS: usize = CLASS_FEATURES.len() + TARGET_SETS.len() + WALK_CLASS_FEATURES.len();
 
-/// Distance at which features of distance saturate, meters.
-const NEAR_SCALE_M: f32 = 10.0;
 /// Height at which features of height saturate, meters.
 const HEIGHT_SCALE_M: f32 = 2.0;
 /// Change of distance within a window at which the feature saturates, meters.
@@ -126,6 +127,9 @@ struct Snapshot {
 pub struct ObservationHistory {
     classes: Vec<ClassId>,
     snapshots: VecDeque<Snapshot>,
+    walk: PartnerWalk,
+    /// Belief about the partner's goal.
+    belief: Option<Belief>,
     /// Top of objects when they were last seen at rest, meters.
     tops_m: BTreeMap<TrackId, f32>,
 }
@@ -139,7 +143,8 @@ impl ObservationHistory {
             classes.copied().filter(|class| is_pickable(*class)).collect();
         classes.sort_unstable();
         classes.dedup();
-        *self = ObservationHistory { classes, ..ObservationHistory::default() };
+        let belief = Some(Belief::new(briefing));
+        *self = ObservationHistory { classes, belief, ..ObservationHistory::default() };
     }
 
     /// Returns the classes that the partner may be after, in the order of the candidates.
@@ -153,12 +158,16 @@ impl ObservationHistory {
     }
 
     /// Adds an observation, after the memory has.
-    pub fn add(&mut self, memory: &Memory, briefing: &Briefing) {
+    pub fn add(&mut self, memory: &Memory, briefing: &Briefing, behavior: &BehaviorLog) {
+        if let Some(belief) = &mut self.belief {
+            belief.observe(briefing, memory, behavior);
+        }
         for object in resting_objects(memory) {
             self.tops_m.insert(object.track, object.top_m);
         }
         let partner = memory.companion(briefing, CompanionRole::Partner).filter(|p| p.is_in_view);
         let partner = partner.map(|p| p.position_in_world);
+        self.walk.observe(memory, behavior, partner.map(to_xz));
         let distances_m = self.classes.iter().map(|class| {
             let objects = resting_objects(memory).filter(|t| t.class == *class);
             nearest(objects, partner).map_or(f32::INFINITY, |(m, _)| m)
@@ -178,11 +187,19 @@ impl ObservationHistory {
 
     /// Encodes the window; candidates are [`ObservationHistory::classes`].
     pub fn encode(
-        &self,
+        &mut self,
         memory: &Memory,
         briefing: &Briefing,
         behavior: &BehaviorLog,
     ) -> CandidateSet {
+        let paths = if self.has_partner() {
+            let is_destination = |object: &&MappedObject| {
+                self.classes.contains(&object.class) || briefing.goal_places.contains(&object.class)
+            };
+            self.walk.paths(memory, resting_objects(memory).filter(is_destination))
+        } else {
+            None
+        };
         let observed: Vec<(&Snapshot, Vec3)> =
             self.snapshots.iter().filter_map(|s| Some((s, s.partner?))).collect();
         let path = PartnerPath {
@@ -192,13 +209,17 @@ impl ObservationHistory {
         };
         let actions = PartnerActions::new(behavior, memory, &self.tops_m);
         let nearest_class = path.nearest_class();
-        let state = self.state(&path, &actions, nearest_class, memory, briefing, behavior);
+        let mut state = self.state(&path, &actions, nearest_class, memory, briefing, behavior);
+        let belief = self.belief.as_ref();
+        let walk = WalkFeatures::new(&self.walk, paths.as_ref(), belief, &self.classes, memory);
+        state.extend(walk.state(memory, briefing, behavior));
         let mut candidates = Vec::with_capacity(self.classes.len() * N_CLASS);
         for k in 0..self.classes.len() {
             let features = self.class_features(k, &path, &actions, nearest_class, memory, behavior);
             candidates.extend(features);
             let sets = self.classes[k].info().sets;
             candidates.extend(TARGET_SETS.iter().map(|set| flag(sets.contains(set))));
+            candidates.extend(walk.class(k));
         }
         CandidateSet { state, candidates, n_candidates: self.classes.len(), memory: Vec::new() }
     }
@@ -232,7 +253,7 @@ impl ObservationHistory {
         let known = resting_objects(memory).filter(|t| self.classes.contains(&t.class));
         let moves_furniture = briefing.possible_targets.iter().any(|c| role(Role::HeavyTarget)(*c));
         let has_child = briefing.companion(CompanionRole::Child).is_some();
-        let state: [f32; N_STATE] = [
+        let state: [f32; STATE_FEATURES.len()] = [
             n_seen as f32 / LENGTH as f32,
             flag(self.snapshots.back().is_some_and(|s| s.partner.is_some())),
             partner.map_or(1.0, |at| {
@@ -336,22 +357,6 @@ impl ObservationHistory {
             normalize_clamped(actions.taken.iter().filter(shares_set).count() as f32, 3.0),
         ]
     }
-}
-
-/// Returns objects that are believed to rest where they were last seen.
-fn resting_objects(memory: &Memory) -> impl Iterator<Item = &MappedObject> {
-    memory
-        .objects
-        .iter()
-        .filter(|t| t.is_present && !t.is_out_of_play && t.held_until <= memory.frame)
-}
-
-/// Returns known goal places.
-fn goal_places<'a>(
-    memory: &'a Memory,
-    briefing: &'a Briefing,
-) -> impl Iterator<Item = &'a MappedObject> {
-    memory.objects.iter().filter(|t| briefing.goal_places.contains(&t.class))
 }
 
 /// Returns the nearest object and its horizontal distance, meters.

@@ -171,7 +171,7 @@ impl ObservationEncoder {
         if let (Some(opponent), Some(memory), Some(briefing)) =
             (&mut self.opponent, memory, &self.briefing)
         {
-            opponent.observe(memory, briefing);
+            opponent.observe(memory, briefing, self.agent.behavior());
         }
     }
 

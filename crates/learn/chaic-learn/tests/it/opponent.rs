@@ -71,6 +71,31 @@ fn windows_are_within_bounds_and_read_back_unchanged() {
     }
 }
 
+/// While the partner goes to pick something up, the rules with the belief about its goal give the class
+/// of the object a much higher probability than other classes.
+#[test]
+fn the_rules_and_the_belief_tell_the_target_of_the_partner() {
+    let config = WindowCollectionConfig {
+        max_per_class: 200,
+        episodes: 4,
+        tasks: vec![TaskId::LowTarget, TaskId::NoConstraint],
+        image_size: 128,
+        ..small_collection()
+    };
+    let samples = collect(DatasetSplit::Test, &config, &mut |_| (), &NEVER_STOP).unwrap().unwrap();
+    let (mut of_target, mut of_others) = (0.0, 0.0);
+    for (window, target) in samples.iter().filter_map(|s| Some((&s.window, s.target?))) {
+        for (k, row) in window.candidates.chunks_exact(N_CLASS).enumerate() {
+            // `is_next` is the last feature of a class.
+            match k == target {
+                true => of_target += row[N_CLASS - 1],
+                false => of_others += row[N_CLASS - 1] / (window.n_candidates - 1) as f32,
+            }
+        }
+    }
+    assert!(of_target > 3.0 * of_others, "{of_target} {of_others}");
+}
+
 #[test]
 fn limits_describe_the_body() {
     let limits_of = |persona: Persona| limits(&persona.capability());

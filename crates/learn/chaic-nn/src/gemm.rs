@@ -256,9 +256,6 @@ impl TileKernel for Product<'_> {
 
 /// Tile of the left matrix, read column by column.
 pub(crate) trait Left<const ROWS: usize> {
-    /// Returns the first `n` columns. Loops below `n` then need no bounds checks.
-    fn first(self, n: usize) -> Self;
-
     fn at(&self, k: usize) -> [f32; ROWS];
 }
 
@@ -266,11 +263,6 @@ pub(crate) trait Left<const ROWS: usize> {
 pub(crate) struct Rows<'a, const ROWS: usize>(pub [&'a [f32]; ROWS]);
 
 impl<const ROWS: usize> Left<ROWS> for Rows<'_, ROWS> {
-    #[inline(always)]
-    fn first(self, n: usize) -> Self {
-        Rows(self.0.map(|row| &row[..n]))
-    }
-
     #[inline(always)]
     fn at(&self, k: usize) -> [f32; ROWS] {
         let mut column = [0.0; ROWS];
@@ -285,11 +277,6 @@ impl<const ROWS: usize> Left<ROWS> for Rows<'_, ROWS> {
 struct Packed<'a, const ROWS: usize>(&'a [[f32; ROWS]]);
 
 impl<const ROWS: usize> Left<ROWS> for Packed<'_, ROWS> {
-    #[inline(always)]
-    fn first(self, n: usize) -> Self {
-        Packed(&self.0[..n])
-    }
-
     #[inline(always)]
     fn at(&self, k: usize) -> [f32; ROWS] {
         self.0[k]
@@ -408,9 +395,7 @@ pub(crate) fn multiply_add<S: Simd, const ROWS: usize, const VECTORS: usize>(
     right: &[f32],
 ) -> [[S::f32s; VECTORS]; ROWS] {
     let (vectors, _) = S::as_simd_f32s(right);
-    let right = vectors.as_chunks::<VECTORS>().0;
-    let left = left.first(right.len());
-    for (k, right) in right.iter().enumerate() {
+    for (k, right) in vectors.as_chunks::<VECTORS>().0.iter().enumerate() {
         let left = left.at(k);
         for i in 0..ROWS {
             let x = simd.splat_f32s(left[i]);

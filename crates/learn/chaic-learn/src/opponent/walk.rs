@@ -1,7 +1,8 @@
 //! Current walk of the partner, and how well each place explains it.
 //!
 //! A person who walks to a place follows a short path. The detour over the present position tells
-//! likely destinations from unlikely ones (inverse planning).
+//! likely destinations from unlikely ones (inverse planning). The constants are ours and not tuned,
+//! since a learned model weighs the features.
 
 use std::collections::{BTreeMap, BTreeSet};
 

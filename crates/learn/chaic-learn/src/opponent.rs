@@ -1,7 +1,7 @@
 //! Opponent model of Smart-Help (Cao et al. 2024; here as in the paper's appendix on learning).
 //! From a helper's last five observations it predicts the partner's goal and physical limits.
 //!
-//! [`window`] encodes the input, with [`walk`] and [`walk_features`], [`network`] has the model, [`tracker`] runs it during an episode,
+//! [`window`] encodes the input, [`network`] has the model, [`tracker`] runs it during an episode,
 //! [`collect`] collects labeled windows from generated episodes, and [`train`] and [`report`] train
 //! and evaluate the model.
 

@@ -100,10 +100,11 @@ impl BehaviorModel for GroundTruthBehavior {
                 action: granted.action.map(TrackId::from),
                 outcome: granted.outcome,
             };
+            // A repeated report, or the end of the attempt. Otherwise it is a new attempt.
             let is_same = |old: &&mut ObservedInteraction| {
-                old.agent == new.agent
-                    && old.action == new.action
-                    && (old.frame == new.frame || old.outcome.is_none())
+                let is_repeated = old.frame == new.frame && old.outcome == new.outcome;
+                let is_end = old.outcome.is_none() && new.outcome.is_some();
+                old.agent == new.agent && old.action == new.action && (is_repeated || is_end)
             };
             match log.actions.iter_mut().rev().take(4).find(is_same) {
                 Some(old) => *old = new,
@@ -158,13 +159,15 @@ impl InferredBehavior {
         InferredBehavior { watched, log: BehaviorLog::default(), lying_positions: BTreeMap::new() }
     }
 
-    /// Removes inferred pick-ups of objects that still lie at their old position.
+    /// Removes inferred pick-ups of objects that still lie at their old position, and held objects
+    /// that lie anywhere.
     fn revert_pick_ups(&mut self, memory: &Memory) {
         let is_lying =
             |t: &&MappedObject| t.last_seen == memory.frame && t.held_until <= memory.frame;
         for object in memory.objects.iter().filter(is_lying).filter(|t| t.class.info().is_movable())
         {
             let at = object.position_in_world;
+            self.log.partner_holds.retain(|(track, _)| *track != object.track);
             let is_taken = self.log.partner_taken.iter().any(|(track, _)| *track == object.track);
             if !is_taken {
                 self.lying_positions.insert(object.track, at);
@@ -238,7 +241,7 @@ impl BehaviorModel for InferredBehavior {
 mod tests {
     use super::*;
     use crate::perception::{Detection, Percepts};
-    use crate::test_support::Toy;
+    use crate::test_support::{Toy, seen, seen_partner};
     use chaic_core::EntityId;
     use chaic_core::observation::{HeldIdentity, ObservedAction};
     use chaic_core::{Hand, Outcome};
@@ -281,6 +284,56 @@ mod tests {
         let last = model.log().last_pick_of(AgentId::PARTNER);
         assert_eq!(last.map(|(_, object)| object), Some(apple.0));
         assert_eq!(model.log().last_pick_of(AgentId::CHILD), None);
+    }
+
+    #[test]
+    fn a_new_attempt_on_the_same_object_is_another_record() {
+        let toy = Toy::room(4.0, 4.0);
+        let memory = Memory::new(&toy.briefing(), crate::PlannerRules::paper());
+        let mut model = GroundTruthBehavior::default();
+        let failed = Some(Outcome::Failure(chaic_core::FailureReason::BeyondLimits));
+        // The first end is not observed. The third attempt begins when the second one ends.
+        let reports = [(10, None), (50, None), (90, failed), (90, None), (90, None), (130, failed)];
+        for (frame, outcome) in reports {
+            let mut observation = toy.observe();
+            observation.granted.behavior = vec![ObservedAction {
+                agent: AgentId::PARTNER,
+                frame,
+                action: Action::PickUp { object: EntityId(20), hand: Hand::Left },
+                outcome,
+            }];
+            model.observe(&observation, &memory);
+        }
+        let records: Vec<_> = model.log().actions.iter().map(|a| (a.frame, a.outcome)).collect();
+        assert_eq!(records, [(10, None), (90, failed), (130, failed)]);
+    }
+
+    #[test]
+    fn an_object_seen_lying_is_no_longer_held() {
+        // At its first position it was never taken. Elsewhere it was put down.
+        for (lies_at, n_taken) in [(2.0, 0), (-2.0, 1)] {
+            let mut toy = Toy::room(8.0, 8.0);
+            let briefing = toy.briefing();
+            let mut memory = Memory::new(&briefing, crate::PlannerRules::paper());
+            let mut model = InferredBehavior::new(AgentId::PARTNER);
+            let apple = |x: f32| seen(TrackId(20), "apple", [x, 1.0, -3.0], 0.1, 0.1);
+            let partner = || seen_partner(0.0, -3.0);
+            // Detections of successive frames; the expected numbers of objects taken and held.
+            let observations = [
+                (vec![partner(), apple(2.0)], 0, 0),
+                (vec![partner(), apple(0.5)], 1, 1),
+                (vec![apple(lies_at)], n_taken, 0),
+            ];
+            for (detections, n_taken, n_held) in observations {
+                toy.frame += 10;
+                let observation = toy.observe();
+                let percepts = Percepts { detections, ..Percepts::default() };
+                memory.update(&briefing, &observation, &percepts);
+                model.observe(&observation, &memory);
+                let (taken, held) = (&model.log().partner_taken, &model.log().partner_holds);
+                assert_eq!((taken.len(), held.len()), (n_taken, n_held), "frame {}", toy.frame);
+            }
+        }
     }
 
     #[test]

@@ -217,7 +217,7 @@ pub trait Policy: Send + 'static {
     fn reset(&mut self, briefing: &Briefing);
 
     /// Returns the plan to execute next. `valid` is never empty; plans of one kind are sorted by
-    /// distance, nearest first. [`Plan::LiftWith`] is sorted by track.
+    /// distance, nearest first. [`Plan::LiftWith`] is sorted by distance from the partner.
     ///
     /// # Errors
     /// If the policy cannot choose; the agent then takes no decision.
@@ -292,7 +292,7 @@ pub trait Policy: Send + 'static {
 }
 
 /// Returns all plans that can be started now, plans of one kind sorted by distance, and
-/// [`Plan::LiftWith`] by track. Never empty.
+/// [`Plan::LiftWith`] by distance from the partner. Never empty.
 pub fn valid_plans(memory: &Memory, briefing: &Briefing) -> Vec<Plan> {
     let hands = HandState::new(&memory.hands, briefing);
     let mut plans = vec![Plan::Explore];
@@ -339,7 +339,8 @@ fn reachable<'a>(
     found.into_iter().map(|(_, t)| Subject::from_object(t))
 }
 
-/// Returns the furniture that the partner stands beside, in the order of tracks.
+/// Returns the furniture that the partner stands beside, nearest to the partner first. Pieces at
+/// the same distance are in the order of tracks.
 fn furniture_at_partner<'a>(
     memory: &'a Memory,
     briefing: &Briefing,
@@ -349,21 +350,27 @@ fn furniture_at_partner<'a>(
         .companion(briefing, CompanionRole::Partner)
         .filter(|p| p.frame + rules.partner_sighting_max_age_frames > memory.frame)
         .map(|p| to_xz(p.position_in_world));
-    memory
+    let mut found: Vec<(f32, &MappedObject)> = memory
         .objects
         .iter()
         .filter(|t| t.class.info().role == Role::HeavyTarget && t.is_available(memory.frame))
-        .filter(move |t| partner.is_some_and(|p| t.distance_from(p) < rules.partner_at_furniture_m))
-        .map(Subject::from_object)
+        .filter_map(|t| Some((t.distance_from(partner?), t)))
+        .filter(|(distance_m, _)| *distance_m < rules.partner_at_furniture_m)
+        .collect();
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    found.into_iter().map(|(_, t)| Subject::from_object(t))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_support::{carried, hands};
+    use crate::perception::{GroundTruthIds, Perception as _};
+    use crate::test_support::{Toy, ToyObject, carried, hands};
+    use chaic_core::geom::Pose;
+    use chaic_core::{AgentId, Vec3};
 
     fn briefing() -> Briefing {
-        crate::test_support::Toy::room(4.0, 4.0).briefing()
+        Toy::room(4.0, 4.0).briefing()
     }
 
     #[test]
@@ -395,6 +402,22 @@ mod tests {
             ];
             assert_eq!(got, expected, "{held:?}");
         }
+    }
+
+    #[test]
+    fn the_piece_nearest_to_the_partner_is_lifted_first() {
+        let mut toy = Toy::room(10.0, 10.0);
+        let [far, near] =
+            [-1.2, 1.2].map(|x| toy.add(ToyObject::new("piano", [x, 0.0, -3.0], [0.6, 1.0, 0.6])));
+        toy.stand([0.0, 0.0], 0.0);
+        let briefing = toy.briefing();
+        let mut memory = Memory::new(&briefing, crate::PlannerRules::paper());
+        let mut observation = toy.observe();
+        let at = Pose { position: Vec3::new(0.2, 0.0, -1.9), yaw_rad: 0.0 };
+        observation.granted.poses = vec![(AgentId::PARTNER, at)];
+        memory.update(&briefing, &observation, &GroundTruthIds.perceive(&observation));
+        let pieces = furniture_at_partner(&memory, &briefing).map(|subject| subject.track);
+        assert_eq!(pieces.collect::<Vec<_>>(), [near, far]);
     }
 
     #[test]

@@ -79,7 +79,7 @@ pub struct Executor {
     plan_start: Frame,
     n_turns: u32,
     n_lifts: u32,
-    /// Frame of this plan in which the followed person was first near.
+    /// Frame of this plan since which the followed person has been near.
     near_since: Option<Frame>,
     /// Goal place of the current delivery.
     place: Option<TrackId>,
@@ -134,11 +134,6 @@ impl Executor {
 
     /// Returns the next action of `plan`.
     pub fn step(&mut self, plan: &Plan, s: &mut ExecutionContext<'_>) -> Progress {
-        let elapsed = s.memory.frame.saturating_sub(self.plan_start);
-        if elapsed > time_limit(plan, &s.memory.rules.plan_timeouts) {
-            self.give_up(plan, s);
-            return Progress::Failed;
-        }
         if *plan == Plan::FollowChild {
             // The time limit runs only while the child is lost or, without trust in the child,
             // while it is not away.
@@ -148,6 +143,10 @@ impl Executor {
                 false => s.memory.child_is_away(s.briefing),
             };
             self.plan_start = if is_needed { s.memory.frame } else { self.plan_start };
+        }
+        let elapsed = s.memory.frame.saturating_sub(self.plan_start);
+        if elapsed > time_limit(plan, &s.memory.rules.plan_timeouts) {
+            return self.time_out(plan, s);
         }
         let is_standing = matches!(plan, Plan::PutIn | Plan::TurnAround | Plan::Wait);
         if is_standing || self.has_acted {
@@ -205,6 +204,23 @@ impl Executor {
                 if self.n_turns > 1 { Progress::Done } else { Progress::Act(action) }
             }
         }
+    }
+
+    /// Ends a plan at its time limit. The last action may have completed it.
+    fn time_out(&mut self, plan: &Plan, s: &mut ExecutionContext<'_>) -> Progress {
+        let place = self.place.filter(|_| *plan == Plan::Deliver);
+        let subject = plan.subject().map(|subject| subject.track).or(place);
+        let outcome = subject.and_then(|track| self.interaction_outcome(s, track));
+        let is_done = if *plan == Plan::Deliver {
+            HandState::new(&s.memory.hands, s.briefing).to_deliver.is_none()
+        } else {
+            outcome == Some(Outcome::Success)
+        };
+        if is_done {
+            return Progress::Done;
+        }
+        self.give_up(plan, s);
+        Progress::Failed
     }
 
     /// Prevents the same plan from being repeated at once, after a timeout or when stuck.
@@ -352,6 +368,8 @@ impl Executor {
                 PlaceChoice::Random => self.rng.choose(&places),
             };
             self.place = chosen.map(|(t, _)| t.track);
+            // An approach is bound to its place.
+            self.interaction = None;
         }
         let Some(place) = self.place else { return Progress::Failed };
         // A failed put-on ends the plan, because its place is ignored (facts A2.1).
@@ -378,7 +396,15 @@ impl Executor {
             return Progress::Act(action);
         }
         match self.follower.step(s.memory, navigator, agent, keep_m) {
-            FollowStep::Act(action) => Progress::Act(action),
+            FollowStep::Act(action) => {
+                // Slightly farther than `keep_m` still counts as near: both bodies move in steps.
+                let is_near = s.memory.people.get(agent).is_some_and(|p| {
+                    let distance_m = s.memory.position().distance(to_xz(p.position_in_world));
+                    p.is_in_view && distance_m < s.memory.rules.people.child_beside_m.max(keep_m)
+                });
+                self.near_since = self.near_since.filter(|_| is_near);
+                Progress::Act(action)
+            }
             FollowStep::Near(action) => {
                 self.recovery.record_stop();
                 let since = *self.near_since.get_or_insert(s.memory.frame);

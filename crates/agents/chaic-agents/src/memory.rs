@@ -32,6 +32,9 @@ const TOP_TOLERANCE_M: f32 = 0.1;
 /// An object counts as reached from this distance when path lengths are estimated, meters.
 const REACHED_M: f32 = 1.5;
 
+/// Time since a sighting for which a person may affect the costs of [`CarefulCosts`], frames.
+const PEOPLE_FRAMES: Frame = 60;
+
 /// Time after which an object put on the goal place has certainly settled, frames.
 pub const SETTLE_FRAMES: Frame = 240;
 
@@ -89,7 +92,10 @@ pub struct Memory {
     cost_model: Box<dyn CostModel>,
     /// Versions of the occupancy map and of the object layout in the current costs.
     costs_layout: Option<(u32, u32)>,
-    saw_people_recently: bool,
+    /// True if a person was seen recently, or is still in the current costs.
+    has_people_changes: bool,
+    /// True if a person was seen recently when costs were computed last.
+    costs_have_people: bool,
     /// Bounds of the area that bodies cannot leave.
     pub bounds: Rect,
     /// The other carrier of an object that this agent carries as leader.
@@ -139,7 +145,8 @@ impl Memory {
             costs,
             cost_model: cost_model(rules.walking),
             costs_layout: None,
-            saw_people_recently: true,
+            has_people_changes: true,
+            costs_have_people: false,
             bounds: briefing.bounds,
             other_end: None,
             blocked: None,
@@ -166,7 +173,7 @@ impl Memory {
         self.classes.extend(detections.iter().map(|d| (d.track, d.class)));
         let visible = if self.rules.sees_people(briefing) { detections } else { &[] };
         self.people.update(briefing, observation, visible);
-        self.saw_people_recently = self.people.iter().any(|p| p.frame + 60 > self.frame);
+        self.has_people_changes = self.costs_have_people || self.saw_people_recently();
         let in_view: Vec<Vec3> =
             self.people.iter().filter(|p| p.is_in_view).map(|p| p.position_in_world).collect();
         let people_at = if self.rules.sees_held_objects { &in_view[..] } else { &[] };
@@ -356,12 +363,13 @@ impl Memory {
         let changes = MapChanges {
             any: self.is_stale,
             layout: self.costs_layout != Some(layout),
-            people: self.saw_people_recently,
+            people: self.has_people_changes,
         };
         if !self.cost_model.is_outdated_by(changes) {
             return;
         }
-        (self.is_stale, self.costs_layout, self.saw_people_recently) = (false, Some(layout), false);
+        (self.is_stale, self.costs_layout, self.has_people_changes) = (false, Some(layout), false);
+        self.costs_have_people = self.saw_people_recently();
         self.has_path_costs = false;
         let inputs = CostInputs {
             people: &self.blocking_people(),
@@ -372,6 +380,11 @@ impl Memory {
             now: self.frame,
         };
         self.cost_model.recompute(&mut self.costs, &inputs);
+    }
+
+    /// Returns whether a person was seen so recently that it may affect the costs.
+    fn saw_people_recently(&self) -> bool {
+        self.people.iter().any(|p| p.frame + PEOPLE_FRAMES > self.frame)
     }
 
     /// Returns the people that the path must avoid. The other carrier is excluded (facts A2.5: a

@@ -54,7 +54,7 @@ impl Turn<'_> {
         for entity in self.facts.setup.entities() {
             let thing = self.thing(entity);
             let is_released = thing.last_holder == Some(agent)
-                && matches!(thing.location, Location::Rests(_))
+                && matches!(thing.location, Location::Rests(_) | Location::Falls)
                 && thing.delivered.is_none();
             if is_released && self.role(entity) != Role::Obstacle {
                 self.deliver(entity);

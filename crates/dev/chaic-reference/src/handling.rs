@@ -98,6 +98,7 @@ impl Turn<'_> {
         if doing.failing == Some(FailureReason::Broke) {
             self.thing_mut(object).location = Location::Broken;
             self.happens(EventKind::Broke { agent, object });
+            self.drop_stack(object);
             return;
         }
         let thing = self.thing_mut(object);
@@ -283,11 +284,15 @@ impl Turn<'_> {
         self.state.touched.push(object);
         self.happens(EventKind::Released { agent, object, on });
         let goal = on.filter(|place| self.facts.setup.goal_places.contains(place));
+        // Someone may have taken the place meanwhile.
+        let is_there =
+            on.is_none_or(|place| matches!(self.thing(place).location, Location::Rests(_)));
+        let stands = sets_down && is_there;
         let thing = self.thing_mut(object);
         thing.last_holder = Some(agent);
         thing.put_at = goal;
-        thing.location = if sets_down { Location::Rests(on) } else { Location::Falls };
-        if sets_down {
+        thing.location = if stands { Location::Rests(on) } else { Location::Falls };
+        if stands {
             self.deliver_if_at_goal(object);
             if on.is_none() {
                 self.happens(EventKind::ObstacleRemoved { agent, object });

@@ -197,7 +197,8 @@ impl World {
         let n = (horizontal_distance(from, to) / SPACING_M).ceil() as u32;
         (1..n).any(|i| {
             let p = from.lerp(to, i as f32 / n as f32);
-            let mut walls = self.block_index.near(to_xz(p)).filter(|b| b.entity == EntityId::WALL);
+            let near = self.block_index.near(to_xz(p), 0.0);
+            let mut walls = near.filter(|b| b.entity == EntityId::WALL);
             walls.any(|b| b.y_range()[0] < self.rules.step_over_m && b.nearest_in_plan(p).1)
         })
     }

@@ -51,6 +51,9 @@ impl Body {
 
 /// Side length of a grid cell, meters: a body and its step touch at most four cells.
 const CELL_M: f32 = 1.0;
+/// Maximum radius of a body for which each cell lists its boxes, meters: that of a person
+/// (`Setup::check`). Larger bodies, which are scaled objects, are compared with all boxes.
+const MAX_LISTED_RADIUS_M: f32 = 1.0;
 /// Maximum number of push-out iterations; corners need two, narrow gaps a few more.
 const MAX_ITERATIONS: usize = 4;
 /// Overlap that is ignored, meters.
@@ -63,8 +66,7 @@ impl BlockIndex {
         let columns = (size.x / CELL_M).ceil().max(1.0) as usize;
         let rows = (size.y / CELL_M).ceil().max(1.0) as usize;
         let mut lists = vec![Vec::new(); columns * rows];
-        // Bodies extend up to one meter beyond their center (`Setup::check`).
-        let margin = 1.0;
+        let margin = MAX_LISTED_RADIUS_M;
         for (i, block) in blocks.iter().enumerate() {
             let (c, r) = (to_xz(block.center), block.plan_radius() + margin);
             let cell = |v: f32, low: f32, n: usize| {
@@ -95,13 +97,16 @@ impl BlockIndex {
         BlockIndex { blocks, bounds, columns, rows, cells, members }
     }
 
-    /// Returns the boxes that a body at `p` could touch.
-    pub fn near(&self, p: Vec2) -> impl Iterator<Item = &Block> {
+    /// Returns the boxes that a body of this radius at `p` could touch.
+    pub fn near(&self, p: Vec2, radius_m: f32) -> impl Iterator<Item = &Block> {
         let cell = ((p - self.bounds.min) / CELL_M).floor();
         let column = (cell.x.max(0.0) as usize).min(self.columns - 1);
         let row = (cell.y.max(0.0) as usize).min(self.rows - 1);
-        let (start, end) = self.cells[row * self.columns + column];
-        self.members[start as usize..end as usize].iter().map(|i| &self.blocks[*i as usize])
+        let is_listed = radius_m <= MAX_LISTED_RADIUS_M;
+        let (start, end) = if is_listed { self.cells[row * self.columns + column] } else { (0, 0) };
+        let all: &[Block] = if is_listed { &[] } else { &self.blocks };
+        let listed = &self.members[start as usize..end as usize];
+        listed.iter().map(|i| &self.blocks[*i as usize]).chain(all)
     }
 
     /// Returns all boxes.
@@ -147,7 +152,7 @@ impl BlockIndex {
     fn push_out(&self, body: Body, p: Vec2, movable: &[Block], people: &[Disc]) -> (Vec2, f32) {
         let mut at = p;
         let mut deepest: f32 = 0.0;
-        for block in self.near(p).chain(movable) {
+        for block in self.near(p, body.radius_m).chain(movable) {
             let [low, high] = block.y_range();
             if high <= body.low_m || low >= body.high_m {
                 continue;
@@ -272,6 +277,19 @@ mod tests {
             let index = BlockIndex::new(vec![turned], bounds);
             let at = index.slide(WALKER, edge, edge, &[], &[]);
             assert!(at.is_finite() && at.distance(edge) < 1.0, "{at} from {edge}");
+        }
+    }
+
+    #[test]
+    fn large_bodies_touch_distant_boxes() {
+        let index = BlockIndex::new(
+            vec![block([3.5, 0.5, 0.5], [0.1, 0.5, 0.1])],
+            Rect::new([-5.0, -5.0], [5.0, 5.0]),
+        );
+        let p = Vec2::new(0.5, 0.5);
+        for (radius_m, expected) in [(0.2, 0.0), (2.8, 0.0), (3.0, 0.1), (3.4, 0.5)] {
+            let overlap = index.overlap(Body { radius_m, ..WALKER }, p, &[], &[]);
+            assert!((overlap - expected).abs() < 1e-4, "{radius_m}: {overlap}");
         }
     }
 

@@ -6,6 +6,7 @@ use chaic_core::{AgentId, ClassId, EntityId};
 
 use crate::event::EventKind;
 use crate::setup::Setup;
+use crate::state::ObjectLocation;
 use crate::world::World;
 
 /// Maximum penetration of a resting object into its support, meters: solver tolerance and a margin.
@@ -104,13 +105,17 @@ impl World {
         }
     }
 
-    /// Delivers all objects that an agent has taken and released so far, at any place: the second
-    /// rule of the original (facts S5.3).
+    /// Delivers all objects that an agent has taken and released so far, at any place, even while
+    /// they fall: the second rule of the original (facts S5.3).
     pub(crate) fn deliver_all_released(&mut self, agent: AgentId) {
         let is_released = |e: &EntityId| {
             let (spec, state) = self.object(*e);
+            let is_free = matches!(
+                state.location,
+                ObjectLocation::Resting { .. } | ObjectLocation::Falling { .. }
+            );
             state.last_holder == Some(agent)
-                && state.is_resting()
+                && is_free
                 && state.delivered.is_none()
                 && spec.class.info().role != Role::Obstacle
         };

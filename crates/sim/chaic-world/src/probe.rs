@@ -56,7 +56,8 @@ impl World {
         let outermost_m = probe.half_width_m - probe.half_depth_m;
         (-CYLINDERS / 2..=CYLINDERS / 2).any(|k| {
             let at = to_xz(middle + side * (outermost_m * f32::from(k) / f32::from(CYLINDERS / 2)));
-            let near = self.block_index.near(at).filter(|b| self.is_tested(b.entity));
+            let near = self.block_index.near(at, body.radius_m);
+            let near = near.filter(|b| self.is_tested(b.entity));
             let touches_disc =
                 |d: &&crate::collide::Disc| at.distance(d.center) < d.radius_m + body.radius_m;
             near.chain(&movable).any(|b| body.touches(b, at))

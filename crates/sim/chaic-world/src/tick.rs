@@ -322,14 +322,9 @@ impl World {
                 object.rotation = rotation;
             }
             if path.is_empty() {
-                let (entity, on) = (crate::Setup::entity(i), *on);
+                let on = *on;
                 object.location = ObjectLocation::Resting { on };
-                // Someone may have taken the support during the fall.
-                if on.is_some_and(|support| self.object(support).1.holder().is_some()) {
-                    self.start_fall(&[entity]);
-                } else {
-                    self.check_delivery(entity);
-                }
+                self.check_delivery(crate::Setup::entity(i));
             }
         }
     }

@@ -159,6 +159,28 @@ fn objects_in_the_own_hands_stay_there() {
 }
 
 #[test]
+fn a_person_who_has_left_raises_no_costs_after_a_long_action() {
+    let toy = Toy::room(8.0, 8.0);
+    let briefing = toy.briefing();
+    let mut memory = Memory::new(&briefing, PlannerRules::paper());
+    let at = Vec3::new(0.0, 0.0, -2.0);
+    let mut cost_at = |frame, is_there: bool| {
+        let mut observation = toy.observe();
+        (observation.frame, observation.images) = (frame, Default::default());
+        let pose = Pose { position: at, yaw_rad: 0.0 };
+        let granted = is_there.then_some((AgentId::PARTNER, pose));
+        observation.granted.poses = granted.into_iter().collect();
+        memory.update(&briefing, &observation, &GroundTruthIds.perceive(&observation));
+        memory.refresh();
+        let cell = memory.map.grid().cell_at(to_xz(at)).expect("inside the room");
+        memory.costs().cost(cell)
+    };
+    let before = cost_at(0, false);
+    assert!(cost_at(10, true) > before);
+    assert_eq!(cost_at(10 + 2 * PEOPLE_FRAMES, false), before);
+}
+
+#[test]
 fn the_history_contains_interactions_only() {
     let (toy, apple, _) = rooms();
     let mut world = Granted::new(toy, &[]);

@@ -30,7 +30,7 @@ pub struct MapChanges {
     pub any: bool,
     /// True if the static layout has changed.
     pub layout: bool,
-    /// True if a person was seen recently.
+    /// True if a person was seen recently, or was when costs were computed last.
     pub people: bool,
 }
 

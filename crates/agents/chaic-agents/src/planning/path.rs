@@ -14,6 +14,10 @@ const STRAIGHT: u32 = 10;
 const DIAGONAL: u32 = 14;
 /// Cost of one meter of free floor.
 const COST_PER_M: f32 = (FREE * STRAIGHT) as f32 / CELL_M;
+/// Minimum cost of one meter of straight-line distance: a diagonal step costs 14 instead of 14.14
+/// tenths of a straight one.
+const MIN_COST_PER_M: f32 =
+    COST_PER_M * DIAGONAL as f32 / (STRAIGHT as f32 * std::f32::consts::SQRT_2);
 /// Range of costs per bucket in a Dijkstra search: at most the cost of the cheapest step.
 const BUCKET_WIDTH: usize = 64;
 const _: () = assert!(BUCKET_WIDTH <= (FREE * STRAIGHT) as usize);
@@ -94,9 +98,9 @@ impl Search {
         }
     }
 
-    /// Returns an 8-connected path from `start` to any goal cell, if it costs at most `limit`. Its
-    /// cost exceeds the minimum by 1.1 percent at most. No cell is impassable, but occupied cells
-    /// and walls cost more than any detour.
+    /// Returns a cheapest 8-connected path from `start` to any goal cell, if it costs at most
+    /// `limit`. No cell is impassable, but occupied cells and walls cost more than any detour. No
+    /// cell may cost less than [`FREE`].
     pub fn a_star(
         &mut self,
         grid: &Grid,
@@ -108,9 +112,8 @@ impl Search {
         self.nodes.start(start);
         self.queue.clear();
         self.queue.push(0, start as u32);
-        // A diagonal step costs 14 instead of 14.14 tenths of a straight one, so the estimate of a
-        // diagonal distance is up to 1.02 percent too high.
-        let heuristic = |cell: usize| (goal.min_distance_m(cell).max(0.0) * COST_PER_M) as u32;
+        // Admissible, so that the first goal cell has the minimum cost.
+        let heuristic = |cell: usize| (goal.min_distance_m(cell).max(0.0) * MIN_COST_PER_M) as u32;
         while let Some((estimate, cell)) = self.queue.pop() {
             let cell = cell as usize;
             let cost = self.nodes.cost(cell);
@@ -389,6 +392,41 @@ mod tests {
                 None => assert_eq!(expected, u32::MAX, "seed {seed}"),
             }
         }
+    }
+
+    #[test]
+    fn a_star_finds_paths_of_minimum_cost_in_open_space() {
+        let grid = Grid::with_size(44, 44);
+        let n = grid.n_cells();
+        let mut search = Search::new(n);
+        for seed in 0..60 {
+            let mut rng = RngStream::new(seed, "open space", 0);
+            let costs: Vec<u32> = (0..n).map(|_| FREE + rng.below(3) as u32 / 2).collect();
+            let (start, end) = (rng.below(n), rng.below(n));
+            let expected = reference_cost(&grid, &costs, start, end);
+            let path = search.a_star(&grid, &costs, start, &ToCell { grid, cell: end }, u32::MAX);
+            assert_eq!(path.map(|p| p.cost), Some(expected), "seed {seed}");
+        }
+    }
+
+    #[test]
+    fn a_star_prefers_the_cheaper_of_two_diagonal_corridors() {
+        // Both lead 39 cells diagonally. The corridor that begins with two straight steps is
+        // cheaper, and the estimate after them is that of a pure diagonal.
+        let grid = Grid::with_size(42, 40);
+        let cell = |i: usize, j: usize| j * grid.nx() + i;
+        let mut costs = vec![OCCUPIED - 1; grid.n_cells()];
+        for k in 0..40 {
+            (costs[cell(k, k)], costs[cell(k + 2, k)]) = (FREE, FREE);
+        }
+        (costs[cell(1, 0)], costs[cell(40, 39)]) = (FREE, FREE);
+        costs[cell(20, 20)] = FREE + 2;
+        let end = cell(41, 39);
+        let goal = ToCell { grid, cell: end };
+        let path = Search::new(grid.n_cells()).a_star(&grid, &costs, 0, &goal, u32::MAX);
+        let expected = FREE * (2 * STRAIGHT + 39 * DIAGONAL);
+        assert_eq!(path.map(|p| p.cost), Some(expected));
+        assert_eq!(reference_cost(&grid, &costs, 0, end), expected);
     }
 
     #[test]

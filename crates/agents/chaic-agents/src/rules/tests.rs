@@ -287,6 +287,36 @@ fn a_failed_put_on_or_a_timeout_ends_the_delivery_and_the_place_is_ignored() {
 }
 
 #[test]
+fn a_plan_that_succeeds_at_its_time_limit_is_done() {
+    let rules = PlannerRules {
+        failed_goal_place_frames: 500,
+        pick_within_m: 5.0,
+        put_within_m: 5.0,
+        ..PAPER
+    };
+    let late = rules.plan_timeouts.interact_frames + 1;
+    for class in ["apple", "bed"] {
+        let (memory, briefing, track) = memory_of(class, rules);
+        let mut s = Scenario::new(rules);
+        (s.memory, s.briefing) = (memory, briefing);
+        let (plan, hand) = match class {
+            "apple" => (Plan::PickUp(subject(class, track.0)), Hand::Left),
+            _ => (Plan::Deliver, Hand::Right),
+        };
+        s.hands[1] = (plan == Plan::Deliver).then(|| carried("apple", 90, &[]));
+        let mut executor = Executor::new(&s.briefing, &rules);
+        let Progress::Act(action) = s.start_plan(&mut executor, plan) else {
+            panic!("{class} is within reach");
+        };
+        assert_eq!((action.subject(), action.is_interaction()), (Some(track), true));
+        (s.memory.last, s.hands[hand.index()]) = (Some((action, Outcome::Success)), None);
+        s.memory.frame += late;
+        assert_eq!(s.continue_plan(&mut executor, plan), Progress::Done);
+        assert_eq!(s.memory.objects.get(track).expect("seen").ignore_until, 0, "{class}");
+    }
+}
+
+#[test]
 fn an_object_is_forgotten_at_an_empty_position_or_not() {
     for forgets_missing in [true, false] {
         let mut toy = Toy::room(8.0, 8.0);

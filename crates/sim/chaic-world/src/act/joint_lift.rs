@@ -2,7 +2,7 @@
 
 use chaic_core::action::FailureReason;
 use chaic_core::catalogue::Role;
-use chaic_core::geom::{Pose, horizontal_distance};
+use chaic_core::geom::{Pose, horizontal_distance, wrap_angle};
 use chaic_core::{Action, AgentId, EntityId, ResolvedAction, Vec3};
 
 use crate::event::EventKind;
@@ -146,8 +146,8 @@ impl World {
     }
 
     /// Makes room for a turn of the leader, which swings the follower around. If the follower is
-    /// blocked, the leader steps so that both turn about the follower. Returns whether there is
-    /// room.
+    /// blocked anywhere on its way, the leader steps so that both turn about the follower. Returns
+    /// whether there is room.
     pub(crate) fn make_room_to_turn(&mut self, agent: AgentId, yaw_rad: f32) -> bool {
         let joint = self.state.joint.filter(|j| j.leader == agent && j.under_way);
         let Some(joint) = joint.filter(|_| self.rules.blocking == Blocking::Stops) else {
@@ -155,16 +155,27 @@ impl World {
         };
         let pose = self.person(agent).pose;
         let other = pose.to_world(joint.follower_in_leader);
-        let swung = Pose { yaw_rad, ..pose }.to_world(joint.follower_in_leader);
-        if self.has_room(joint.follower, agent, other, swung) {
+        let swung = |yaw_rad: f32| Pose { yaw_rad, ..pose }.to_world(joint.follower_in_leader);
+        let stepped = |yaw_rad: f32| pose.position + other - swung(yaw_rad);
+        // The arc is tested in pieces of at most a radius, as a walk is.
+        let radius_m =
+            self.capability(agent).radius_m.min(self.capability(joint.follower).radius_m);
+        let angle_rad = wrap_angle(yaw_rad - pose.yaw_rad);
+        let arc_m = angle_rad.abs() * horizontal_distance(pose.position, other);
+        let n = (arc_m / radius_m).ceil() as u32;
+        let between = (1..n).map(|i| pose.yaw_rad + angle_rad * (i as f32 / n as f32));
+        let yaws: Vec<f32> = between.chain([yaw_rad]).collect();
+        if yaws.iter().all(|yaw| self.has_room(joint.follower, agent, other, swung(*yaw))) {
             return true;
         }
-        let stepped = pose.position + other - swung;
-        let has_room = self.has_room(agent, joint.follower, pose.position, stepped);
+        let has_room = yaws
+            .iter()
+            .all(|yaw| self.has_room(agent, joint.follower, pose.position, stepped(*yaw)));
         if has_room {
+            let to = stepped(yaw_rad);
             let person = self.person_mut(agent);
-            person.pose.position = stepped;
-            person.walked_m += horizontal_distance(pose.position, stepped);
+            person.pose.position = to;
+            person.walked_m += horizontal_distance(pose.position, to);
         }
         has_room
     }

@@ -297,6 +297,8 @@ impl World {
         let carried_jointly = self.state.joint.is_some_and(|j| j.object == object);
         let goal_place = on.filter(|place| self.setup.goal_places.contains(place));
         let is_aside = set_down && on.is_none();
+        // Someone may have taken the place meanwhile; the object then falls.
+        let set_down = set_down && on.is_none_or(|place| self.object(place).1.is_resting());
         // An agent may have moved to the spot meanwhile.
         let is_taken = is_aside && !self.is_free_floor(object, at);
         // Another agent may have put something there meanwhile.

@@ -150,6 +150,7 @@ impl World {
         if activity.failing == Some(FailureReason::Broke) {
             self.object_mut(object).location = ObjectLocation::Broken;
             self.record_event(EventKind::Broke { agent, object });
+            self.drop_dependents(object);
             return StepProgress::Done;
         }
         let taken = self.object_mut(object);
@@ -187,17 +188,21 @@ impl World {
     }
 
     /// Starts the fall of all objects that rested, directly or indirectly, on an object that was
-    /// taken.
-    fn drop_dependents(&mut self, taken: EntityId) {
+    /// taken or broke. Objects on their way to such a support fall on from where they are.
+    fn drop_dependents(&mut self, removed: EntityId) {
         let mut falling = Vec::new();
-        let mut below = vec![taken];
+        let mut below = vec![removed];
         while let Some(support) = below.pop() {
             let has_lost_support = |e: &EntityId| {
                 let (spec, state) = self.object(*e);
-                state.location == ObjectLocation::Resting { on: Some(support) }
-                    && state.delivered.is_none()
-                    && spec.class.info().is_movable()
-                    && !falling.contains(e)
+                let depends = match &state.location {
+                    ObjectLocation::Resting { on } => {
+                        *on == Some(support) && state.delivered.is_none()
+                    }
+                    ObjectLocation::Falling { on, .. } => *on == Some(support),
+                    _ => false,
+                };
+                depends && spec.class.info().is_movable() && !falling.contains(e)
             };
             let dependents: Vec<EntityId> =
                 self.setup.entities().filter(has_lost_support).collect();
@@ -205,7 +210,9 @@ impl World {
             falling.extend(dependents);
         }
         for object in &falling {
-            self.record_event(EventKind::LostSupport { object: *object });
+            if self.object(*object).1.is_resting() {
+                self.record_event(EventKind::LostSupport { object: *object });
+            }
         }
         if !falling.is_empty() {
             self.start_fall(&falling);

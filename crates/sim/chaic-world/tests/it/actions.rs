@@ -5,18 +5,10 @@ use crate::common::*;
 use chaic_core::action::{Action, FailureReason, Hand, Outcome};
 use chaic_core::capability::Persona;
 use chaic_core::{AgentId, ClassId, EntityId, ResolvedAction, TaskId, Vec2};
-use chaic_world::{
-    EventKind, ObjectLocation, Opening, Room, RoomKind, Snapshot, State, Wall, World,
-};
+use chaic_world::{EventKind, ObjectLocation, Opening, Room, RoomKind, World};
 
 fn pick(object: EntityId) -> ResolvedAction {
     Action::PickUp { object, hand: Hand::Right }
-}
-
-/// Replaces the state of the world.
-fn restore(world: &mut World, state: &State) {
-    let bytes = postcard::to_stdvec(state).expect("a state is plain data");
-    world.restore(&Snapshot(bytes)).expect("the snapshot is of this world");
 }
 
 fn fails(reason: FailureReason) -> Outcome {
@@ -119,7 +111,7 @@ fn inaccessible_objects_all_fail_with_one_reason_and_duration() {
     let mut state = w.state().clone();
     state.objects[2].delivered = Some(0);
     state.objects[5].location = ObjectLocation::Broken;
-    w.restore(&Snapshot(postcard::to_stdvec(&state).unwrap())).unwrap();
+    restore(&mut w, &state);
     for object in [nth(0), nth(1), nth(2), nth(3), nth(4), EntityId(999), EntityId::WALL] {
         let hand = Hand::Right;
         for action in [pick(object), Action::RemoveObstacle { obstacle: object, hand }] {
@@ -315,74 +307,6 @@ fn furniture_too_heavy_for_one_is_lifted_by_two() {
 }
 
 #[test]
-fn objects_on_a_taken_object_fall_together() {
-    let tray = thing("tea_tray", at(0.0, 0.0, -0.6));
-    let top = tray.size_m().y;
-    let apple = |x: f32| thing("apple", at(x, top + 0.001, -0.6));
-    // The upper apple lies on the lower one.
-    let size = apple(0.0).size_m();
-    let upper = thing("apple", at(0.01, top + 0.002 + size.y, -0.6));
-    let mut w = world(hall(vec![tray, apple(0.0), upper], vec![person(Persona::Adult, 0.0, 0.0)]));
-    // The state after both have fallen there.
-    let mut state = w.state().clone();
-    state.objects[2].location = ObjectLocation::Resting { on: Some(nth(0)) };
-    state.objects[3].location = ObjectLocation::Resting { on: Some(nth(1)) };
-    restore(&mut w, &state);
-    assert_eq!(run(&mut w, A, pick(nth(0))).0, Outcome::Success);
-    for _ in 0..300 {
-        w.tick();
-    }
-    let things = &w.state().objects;
-    let [lower, upper] = [things[2].position, things[3].position];
-    assert!(things[2].is_resting() && things[3].is_resting());
-    assert!(lower.distance(upper) > 0.9 * size.min_element(), "{lower} and {upper} overlap");
-    let is_lost_support = |e: &chaic_world::Event| matches!(e.kind, EventKind::LostSupport { .. });
-    assert_eq!(w.drain_events().iter().filter(|e| is_lost_support(e)).count(), 2);
-}
-
-/// A piano carried by two: the leader at (0, z), the follower to its right and ahead.
-fn carried_by_two(walls: Vec<Wall>) -> World {
-    let mut setup = hall(
-        vec![thing("piano", at(0.0, 0.0, 0.0))],
-        vec![person(Persona::Frail, 0.0, 1.15), person(Persona::Helper, 3.0, 0.0)],
-    );
-    setup.seed = 3;
-    setup.walls = walls;
-    let mut w = world(setup);
-    w.submit(A, pick(nth(0))).unwrap();
-    w.submit(B, pick(nth(0))).unwrap();
-    w.advance();
-    assert!(has_event(&mut w, |e| matches!(e.kind, EventKind::LiftedTogether { .. })));
-    w
-}
-
-#[test]
-fn a_leader_swings_the_follower_around_if_there_is_room() {
-    let positions = |w: &World| [0, 1].map(|k| w.state().agents[k].pose.position);
-    let mut free = carried_by_two(Vec::new());
-    let [leader, follower] = positions(&free);
-    assert_eq!(run(&mut free, A, Action::TurnLeft).0, Outcome::Success);
-    let [pivot, swung] = positions(&free);
-    assert!(pivot == leader && swung.distance(follower) > 0.3, "{follower} to {swung}");
-    assert!(swung.z < follower.z - 0.15, "a left turn swings it ahead");
-
-    // With a wall ahead of the follower, they turn about the follower instead.
-    let ahead = wall([-9.0, follower.z - 0.38], [9.0, follower.z - 0.38]);
-    let mut w = carried_by_two(vec![ahead]);
-    assert_eq!(positions(&w), [leader, follower], "the wall blocks neither agent yet");
-    assert_eq!(run(&mut w, A, Action::TurnLeft).0, Outcome::Success);
-    let [stepped, pivot] = positions(&w);
-    assert!(pivot.distance(follower) < 1e-3, "{follower} to {pivot}");
-    assert!((stepped.distance(leader) - swung.distance(follower)).abs() < 1e-3);
-
-    // With another wall behind the leader, there is no room to turn.
-    let behind = wall([-9.0, leader.z + 0.38], [9.0, leader.z + 0.38]);
-    let mut w = carried_by_two(vec![ahead, behind]);
-    assert_eq!(run(&mut w, A, Action::TurnLeft).0, fails(FailureReason::Blocked));
-    assert_eq!(positions(&w), [leader, follower]);
-}
-
-#[test]
 fn an_obstacle_is_not_set_down_on_an_agent() {
     let setup = || {
         let people = vec![person(Persona::Wheelchair, 9.0, 9.0), person(Persona::Helper, 0.6, 1.2)];
@@ -563,25 +487,4 @@ fn a_put_on_ends_if_the_place_is_taken_meanwhile() {
     let put = Action::PutOn { place: nth(1), hand: Hand::Right };
     assert_eq!(run(&mut w, A, put).0, fails(FailureReason::Impossible));
     assert_eq!(w.state().objects[1].holder(), Some(A), "the apple stays in the hand");
-}
-
-#[test]
-fn an_object_falls_on_if_its_support_is_taken_during_the_fall() {
-    let tray = thing("tea_tray", at(0.0, 0.0, -0.6));
-    let apple = thing("apple", at(0.0, 0.5, -0.6));
-    let mut w = world(hall(vec![tray, apple], vec![person(Persona::Adult, 0.0, 0.0)]));
-    w.submit(A, pick(nth(0))).unwrap();
-    while w.state().objects[1].holder().is_none() {
-        w.tick();
-    }
-    // The apple was on its way to the tray.
-    let mut state = w.state().clone();
-    let end = (at(0.0, 0.1, -0.6), state.objects[2].rotation);
-    state.objects[2].location = ObjectLocation::Falling { path: vec![end], on: Some(nth(0)) };
-    restore(&mut w, &state);
-    for _ in 0..200 {
-        w.tick();
-    }
-    let apple = &w.state().objects[2];
-    assert!(apple.is_resting() && apple.position.y < 0.02, "it lies at {}", apple.position);
 }

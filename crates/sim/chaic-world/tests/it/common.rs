@@ -5,7 +5,7 @@ use chaic_core::briefing::Goal;
 use chaic_core::capability::Persona;
 use chaic_core::geom::{Pose, Rect};
 use chaic_core::{AgentId, ClassId, EntityId, Outcome, ResolvedAction, TaskId, Vec2, Vec3};
-use chaic_world::{AgentSpec, Event, ObjectSpec, Rules, Setup, Wall, World};
+use chaic_world::{AgentSpec, Event, ObjectSpec, Rules, Setup, Snapshot, State, Wall, World};
 
 /// Agent 0.
 pub const A: AgentId = AgentId::PARTNER;
@@ -75,6 +75,12 @@ pub fn run(world: &mut World, agent: AgentId, action: ResolvedAction) -> (Outcom
     }
     let outcome = world.state().agents[agent.index()].last.map(|(_, o)| o);
     (outcome.expect("an action has ended"), world.state().frame - start)
+}
+
+/// Replaces the state of the world.
+pub fn restore(world: &mut World, state: &State) {
+    let bytes = postcard::to_stdvec(state).expect("a state is plain data");
+    world.restore(&Snapshot(bytes)).expect("the snapshot is of this world");
 }
 
 pub fn has_event(world: &mut World, predicate: impl Fn(&Event) -> bool) -> bool {

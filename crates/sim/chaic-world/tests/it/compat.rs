@@ -175,6 +175,27 @@ fn a_put_on_anywhere_delivers_only_under_its_rule() {
 }
 
 #[test]
+fn a_put_on_delivers_what_still_falls_under_its_rule() {
+    let things = vec![
+        thing("bike", at(-0.45, 0.0, 0.0)),
+        thing("dining_table", at(1.5, 0.0, 0.0)),
+        thing("apple", at(0.0, 0.0, -0.6)),
+    ];
+    let mut setup = hall(things, vec![person(Persona::Rider, 0.0, 0.0)]);
+    setup.goal.targets[0].1 = 2;
+    let mut w = with(Rules { put_on_delivers_all_released: true, ..PAPER }, setup);
+    assert_eq!(run(&mut w, A, pick(nth(2))).0, Outcome::Success);
+    assert_eq!(run(&mut w, A, put(nth(1))).0, Outcome::Success);
+    let is_resting = |w: &World| w.state().objects[3].is_resting();
+    assert!(!is_resting(&w), "a rider does not watch the fall");
+    assert_eq!(w.delivered(), vec![nth(2)]);
+    for _ in 0..240 {
+        w.tick();
+    }
+    assert!(is_resting(&w));
+}
+
+#[test]
 fn a_failed_put_on_delivers_with_a_successful_one_under_its_rule() {
     // Attempts with the left and the right hand, each at a table within or above the reach.
     let delivered = |succeed: [bool; 2], put_on_delivers_all_released| {

@@ -7,6 +7,8 @@ mod compat;
 mod determinism;
 mod granted;
 mod impairments;
+mod joint_carry;
 mod positions;
 mod random;
+mod supports;
 mod watches;

@@ -72,6 +72,30 @@ fn the_nearest_or_a_random_goal_place_is_chosen() {
 }
 
 #[test]
+fn a_delivery_to_another_place_starts_another_approach() {
+    use chaic_core::AgentId;
+    use chaic_core::capability::Gait;
+    use std::f32::consts::FRAC_PI_2;
+    // The rider approaches the position that the place had when the approach began.
+    let mut s = Scenario::new(PlannerRules { walking: Walking::Lattice, ..PAPER });
+    (s.briefing.me, s.briefing.capability.gait) = (AgentId::PARTNER, Gait::WalkBike);
+    let mut toy = Toy::room(10.0, 10.0);
+    let beds = [-3.0, 3.0].map(|x| toy.add(ToyObject::new("bed", [x, 0.0, 0.0], [0.3, 0.6, 0.3])));
+    s.hands[0] = Some(carried("apple", 90, &[]));
+    toy.stand([0.0, 0.0], FRAC_PI_2);
+    s.observe(&toy);
+    let mut executor = Executor::new(&s.briefing, &s.memory.rules);
+    let ahead = Progress::Act(Action::MoveForward);
+    assert_eq!(s.start_plan(&mut executor, Plan::Deliver), ahead);
+    // The first bed is gone, and the second one is straight ahead.
+    toy.stand([0.0, 0.0], -FRAC_PI_2);
+    let observation = toy.observe();
+    s.memory.update(&s.briefing, &observation, &GroundTruthIds.perceive(&observation));
+    s.memory.objects.mark_absent(beds[0]);
+    assert_eq!(s.continue_plan(&mut executor, Plan::Deliver), ahead);
+}
+
+#[test]
 fn interactions_start_at_the_distances_in_the_rules() {
     for class in ["apple", "bed"] {
         let (memory, briefing, track) = memory_of(class, PAPER);

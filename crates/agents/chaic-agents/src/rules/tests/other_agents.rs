@@ -111,11 +111,15 @@ fn observe_both(s: &mut Scenario, frame: Frame) {
 
 /// Observes guardian and child at this distance from each other; the child is beside the helper.
 fn observe_apart(s: &mut Scenario, frame: Frame, apart_m: f32) {
+    observe_poses(s, frame, pose(0.0, apart_m - 1.5), pose(0.0, -1.5));
+}
+
+/// Observes guardian and child in these poses; the helper is at the origin.
+fn observe_poses(s: &mut Scenario, frame: Frame, guardian: Pose, child: Pose) {
     let mut observation = Toy::room(4.0, 4.0).observe();
     observation.images = Default::default();
     observation.frame = frame;
-    observation.granted.poses =
-        vec![(AgentId::PARTNER, pose(0.0, apart_m - 1.5)), (AgentId::CHILD, pose(0.0, -1.5))];
+    observation.granted.poses = vec![(AgentId::PARTNER, guardian), (AgentId::CHILD, child)];
     s.memory.update(&s.briefing, &observation, &GroundTruthIds.perceive(&observation));
 }
 
@@ -163,6 +167,41 @@ fn the_helper_stays_with_the_child_briefly_or_as_long_as_it_is_there() {
         assert_eq!(then == Progress::Done, leaves_returning_child, "{then:?}");
         assert_eq!(matches!(then, Progress::Act(_)), !leaves_returning_child, "{then:?}");
     }
+}
+
+#[test]
+fn the_time_beside_the_child_starts_again_when_the_child_has_moved_away() {
+    // It has just left the distance to keep at 2.1 m, and is away at 2.8 m.
+    for (child_m, is_done) in [(2.1, true), (2.8, false)] {
+        let mut s = child_scenario(PAPER);
+        let mut executor = Executor::new(&s.briefing, &s.memory.rules);
+        let guardian = pose(0.0, 8.0);
+        observe_poses(&mut s, 100, guardian, pose(0.0, -1.5));
+        let mut progress = s.start_plan(&mut executor, Plan::FollowChild);
+        for (frame, z) in [(120, -child_m), (140, -1.5)] {
+            assert!(matches!(progress, Progress::Act(_)), "{frame}: {progress:?}");
+            observe_poses(&mut s, frame, guardian, pose(0.0, z));
+            progress = s.continue_plan(&mut executor, Plan::FollowChild);
+        }
+        assert_eq!(progress == Progress::Done, is_done, "{child_m} m: {progress:?}");
+        if !is_done {
+            observe_poses(&mut s, 171, guardian, pose(0.0, -1.5));
+            let end = s.continue_plan(&mut executor, Plan::FollowChild);
+            assert_eq!(end, Progress::Done, "31 frames after 140");
+        }
+    }
+}
+
+#[test]
+fn a_child_that_comes_into_view_restarts_the_time_limit_before_it_is_checked() {
+    let mut s = child_scenario(PAPER);
+    let mut executor = Executor::new(&s.briefing, &s.memory.rules);
+    observe_apart(&mut s, 100, 9.5);
+    executor.start_plan(100, &s.memory.rules);
+    let late = 100 + s.memory.rules.plan_timeouts.follow_child_frames + 1;
+    observe_apart(&mut s, late, 9.5);
+    let progress = s.continue_plan(&mut executor, Plan::FollowChild);
+    assert!(matches!(progress, Progress::Act(_)), "{progress:?}");
 }
 
 #[test]

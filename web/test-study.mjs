@@ -2,8 +2,9 @@
 //
 // Promises: nothing is stored before the consent; a participation by keyboard alone gives data that
 // `chaic study export` verifies; a reload loses nothing and goes on at the checkpoint; stopping deletes all
-// data; one switch suffices; axe finds nothing, and nothing is wider than the page. With a server, the same holds for
-// its files, also if the network or the server fails in between; these tests need a command with the feature
+// data, or says what delays this; a browser that stores no data leads to a message; one switch suffices; axe finds
+// nothing, and nothing is wider than the page. With a server, the same holds for its files, also if the network or the
+// server fails in between; these tests need a command with the feature
 // `study-server`.
 
 import assert from "node:assert/strict";
@@ -205,6 +206,70 @@ test("stopping deletes all data, also in an episode", async () => {
   assert.equal(await databases(page), 0);
   await page.reload();
   await heading(page, "Help with high shelves");
+  await context.close();
+});
+
+test("a browser that stores no data leads to a message", async () => {
+  const context = await browser.newContext();
+  const page = await context.newPage();
+  await page.goto(`file://${file}#2`);
+  await heading(page, "Help with high shelves");
+  await page.evaluate(() => {
+    window.open_ = IDBFactory.prototype.open;
+    IDBFactory.prototype.open = () => {
+      throw new DOMException("denied", "SecurityError");
+    };
+  });
+  await page.getByRole("button", { name: "I agree" }).click();
+  await page.getByText("this browser does not store your data (SecurityError: denied)").waitFor();
+  await heading(page, "Help with high shelves");
+  await page.evaluate(() => {
+    IDBFactory.prototype.open = window.open_;
+  });
+  await page.getByRole("button", { name: "I agree" }).click();
+  await heading(page, "Instructions");
+  assert.equal(await page.getByRole("alert").count(), 0);
+  // Without a record, later ones would leave a gap.
+  await page.evaluate(() => {
+    window.add_ = IDBObjectStore.prototype.add;
+    IDBObjectStore.prototype.add = function (...values) {
+      const request = window.add_.apply(this, values);
+      this.transaction.abort();
+      return request;
+    };
+  });
+  await page.getByRole("button", { name: "Continue" }).click();
+  await page.getByText("this browser does not store your data").waitFor();
+  await page.evaluate(() => {
+    IDBObjectStore.prototype.add = window.add_;
+  });
+  await page.getByRole("button", { name: "Continue" }).click();
+  assert.deepEqual((await records(page)).map((record) => record.type), ["start"]);
+  await page.reload();
+  await heading(page, "Instructions");
+  await context.close();
+});
+
+test("a deletion says that it waits for another tab", async () => {
+  const { page, context } = await open("#2");
+  await page.getByRole("button", { name: "I agree" }).click();
+  await heading(page, "Instructions");
+  const second = await context.newPage();
+  await second.goto(page.url());
+  // A page of an earlier version keeps its connection.
+  await second.evaluate(async () => {
+    const [{ name }] = await indexedDB.databases();
+    const request = indexedDB.open(name);
+    await new Promise((resolve) => (request.onsuccess = resolve));
+    window.kept = request.result;
+  });
+  await page.getByRole("button", { name: "Stop and delete" }).click();
+  await page.getByRole("button", { name: "Delete and stop" }).click();
+  await page.getByText("This study is open in another tab").waitFor();
+  await page.getByText("Your data are being deleted").waitFor();
+  await second.close();
+  await page.getByText("All your data in this browser are deleted").waitFor();
+  assert.equal(await databases(page), 0);
   await context.close();
 });
 

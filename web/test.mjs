@@ -403,7 +403,7 @@ test("a game of steps obeys the keys, and its world goes on if it is live", asyn
   await page.waitForFunction(() => document.querySelector("chaic-play")?.shown?.status === "waiting");
   await page.waitForTimeout(300);
   assert.equal((await state()).frame, 0, "the world waits");
-  await page.locator("chaic-play .controls button").first().focus();
+  // The start of a game has moved the focus to it.
   await page.keyboard.press("ArrowLeft");
   await page.waitForFunction(() => document.querySelector("chaic-play").shown.caption.action === "turns left");
   await page.waitForFunction(() => document.querySelector("chaic-play").shown.status === "waiting");
@@ -431,6 +431,7 @@ test("a person takes over from a frame of a replay", async () => {
   await page.getByRole("button", { name: "Watch the replay" }).click();
   await shown(page);
   assert.equal(await choice.inputValue(), "", "it is no replay of the page");
+  assert.equal(await page.evaluate(() => location.hash), "", "the address names no replay");
   await choice.selectOption("0");
   await shown(page);
   assert.equal(await page.evaluate(() => document.querySelector("chaic-replay").frame), 0);

@@ -20,6 +20,8 @@ declare module "*/chaic_web.js" {
     choose_plan(plan: string): boolean;
     act(action: string): boolean;
     trace(): string;
+    trace_after(n_lines: number): string;
+    n_lines(): number;
     reference_rate(episode: Uint8Array, helper: string): number;
     view(side: number): Picture;
     free(): void;

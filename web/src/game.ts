@@ -39,4 +39,6 @@ export async function startGame(
     place.append(traceOffer(result.trace, () => onReplay(result)));
   });
   place.replaceChildren(element);
+  // The button that has started the game does not receive its keys.
+  element.focus({ preventScroll: true });
 }

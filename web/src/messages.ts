@@ -260,7 +260,8 @@ export type Request =
   | { type: "rerun" }
   | { type: "play"; module: ArrayBuffer; episode: Uint8Array; config: LiveConfig; branch?: Branch }
   | { type: "advance"; frames: number; viewPx: number; input?: { plan: string } | { action: Action } }
-  | { type: "trace" }
+  /** `isPartial` asks for only the lines that no earlier request has returned. */
+  | { type: "trace"; isPartial: boolean }
   | { type: "reference"; helper: string }
   | ({ type: "continue"; module: ArrayBuffer; episode: Uint8Array; helper: string } & Branch);
 

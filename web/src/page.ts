@@ -5,7 +5,7 @@ import "./compare.js";
 import type { ChaicCompare } from "./compare.js";
 import { embedded, moduleBytes, workerSource } from "./embedded.js";
 import { startGame, traceOffer, type Pace } from "./game.js";
-import type { LanguageAgent, LiveConfig } from "./messages.js";
+import type { LanguageAgent, LiveConfig, Request } from "./messages.js";
 import type { GameResult } from "./play.js";
 import type { Source } from "./player.js";
 import "./replay.js";
@@ -35,6 +35,12 @@ function address(): Shown {
     other: other === undefined ? undefined : Number(other),
     frame: Number(frame ?? 0),
   };
+}
+
+/** Changes what the page's address names. */
+function setFragment(fragment: string): void {
+  // Pages inside a notebook have no address.
+  if (location.protocol !== "about:") history.replaceState(null, "", `#${fragment}`);
 }
 
 const encoder = new TextEncoder();
@@ -109,6 +115,8 @@ class Replays {
     this.other.replaceChildren();
     this.other.disabled = true;
     this.player.replaceChildren(element);
+    // The address of the replay before would name another one.
+    setFragment("");
   }
 
   /** Shows no replay. */
@@ -145,14 +153,20 @@ class Replays {
     clearTimeout(this.pending);
     const { replay, other } = this.shown!;
     const name = other === undefined ? replay : `${replay}+${other}`;
-    this.pending = window.setTimeout(() => {
-      // Pages inside a notebook have no address.
-      if (location.protocol !== "about:") history.replaceState(null, "", `#${name}@${frame}`);
-    }, 300);
+    this.pending = window.setTimeout(() => setFragment(`${name}@${frame}`), 300);
   }
 }
 
 let replays: Replays | undefined;
+/** Ends the worker of a helper that goes on, when something else takes its place. */
+let continuation = new AbortController();
+
+/** Ends the worker of a helper that goes on; returns the signal for the next one. */
+function endContinuation(): AbortSignal {
+  continuation.abort();
+  continuation = new AbortController();
+  return continuation.signal;
+}
 
 /** Creates the element of a replay, from which a person or another helper can take over. */
 function replayElement(source: Source, start: number): ChaicReplay {
@@ -178,9 +192,11 @@ async function goOn(source: Source, frame: number, helper: string): Promise<void
   status.textContent = `The helper ${helper} goes on ...`;
   place.replaceChildren(status);
   const { module, trace: from, episode } = source;
-  const response = await ask(workerSource(), { type: "continue", module, trace: from, episode, frame, helper });
+  const signal = endContinuation();
+  const request: Request = { type: "continue", module, trace: from, episode, frame, helper };
+  const response = await ask(workerSource(), request, signal);
   // A game or another helper took the place meanwhile.
-  if (!status.isConnected) return;
+  if (!response || !status.isConnected) return;
   if (response.type !== "trace") {
     status.textContent = `The helper ${helper} cannot go on: ${response.type === "error" ? response.message : response.type}`;
     return;
@@ -210,6 +226,7 @@ async function play(
   branch?: { trace: Uint8Array; frame: number },
 ): Promise<void> {
   const place = document.getElementById("play")!;
+  endContinuation();
   const module = await moduleBytes();
   const watch = ({ trace }: GameResult): void => {
     showElement(replayElement({ module, trace: encoder.encode(trace), episode, language: [] }, 0));

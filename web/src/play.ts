@@ -83,11 +83,15 @@ export class ChaicPlay extends LitElement {
   private lastTime = 0;
   private elapsedFrames = 0;
   private readonly scanner = new Scanner(this, () => this.choices());
-  /** Length of the trace that a study has, characters. */
-  private recordedLength = 0;
   private recordedFrame = 0;
   /** Number of requests for the trace without a response. */
   private nTraceRequests = 0;
+
+  override connectedCallback(): void {
+    super.connectedCallback();
+    // The page moves the focus here when a person starts a game.
+    this.tabIndex = -1;
+  }
 
   override disconnectedCallback(): void {
     super.disconnectedCallback();
@@ -106,7 +110,7 @@ export class ChaicPlay extends LitElement {
     this.story = [];
     this.references = new Map();
     this.isOver = false;
-    this.recordedLength = this.recordedFrame = this.nTraceRequests = 0;
+    this.recordedFrame = this.nTraceRequests = 0;
   }
 
   private open(game: Game): void {
@@ -213,13 +217,16 @@ export class ChaicPlay extends LitElement {
     });
   }
 
-  /** Moves the focus to the first plan, unless the person is elsewhere on the page. */
+  /** Moves the focus to the first plan, or to the game without plans, unless the person is elsewhere on the page. */
   private focusChoices(): void {
     const focused = document.activeElement;
     if (focused !== document.body && focused !== this) return;
+    const section = this.shadowRoot?.querySelector<HTMLElement>("section");
     const within = this.shadowRoot?.activeElement;
-    if (within && !within.closest(".plans")) return;
-    this.shadowRoot?.querySelector<HTMLButtonElement>(".plans button")?.focus();
+    if (within && within !== section && !within.closest(".plans")) return;
+    const plan = section?.querySelector<HTMLElement>(".plans button");
+    if (plan) plan.focus();
+    else section?.focus({ preventScroll: true });
   }
 
   /** Ends the game; its trace so far is complete. */
@@ -232,13 +239,12 @@ export class ChaicPlay extends LitElement {
 
   private requestTrace(): void {
     this.nTraceRequests += 1;
-    this.post({ type: "trace" });
+    // The trace of a study is passed on in parts, since its length grows with the episode.
+    this.post({ type: "trace", isPartial: this.game?.isStudy ?? false });
   }
 
   /** Passes on the lines that the trace has in addition. */
-  private record(trace: string): void {
-    const added = trace.slice(this.recordedLength);
-    this.recordedLength = trace.length;
+  private record(added: string): void {
     if (added) this.dispatchEvent(new CustomEvent<string>("recorded", { detail: added }));
   }
 
@@ -308,7 +314,7 @@ export class ChaicPlay extends LitElement {
     if (this.problem) return html`<p class="problem" role="alert">Cannot play: ${this.problem}</p>`;
     if (!info) return this.isOver ? html`` : html`<p role="status">Loading ...</p>`;
     const inputs = this.game?.config.level === "plans" ? this.plans(shown) : this.steps(shown);
-    return html`<section aria-label="Play" @keydown=${(event: KeyboardEvent) => this.press(event)}>
+    return html`<section aria-label="Play" tabindex="-1" @keydown=${(event: KeyboardEvent) => this.press(event)}>
       ${this.heading(info)}
       <div class="columns">
         <figure class="a${this.game?.config.seat ?? 0}">

@@ -165,7 +165,10 @@ export class ChaicReplay extends LitElement {
       </p>
       ${this.problem
         ? html`<p class="problem" role="alert">
-            Shown up to frame ${info.last_frame} of ${info.length}: ${this.problem}
+            ${this.problem === info.problem
+              ? `Shown up to frame ${info.last_frame} of ${info.length}`
+              : "Cannot show other frames"}:
+            ${this.problem}
           </p>`
         : nothing}
       <p class="small">${info.episode}, helper ${info.helper}, seed ${info.seed}, chaic ${info.chaic}</p>

@@ -72,6 +72,8 @@ export class ChaicStudy extends LitElement {
   private participant?: Participant;
   /** True while an episode waits for the connection to the server. */
   @state() private isConnectionLost = false;
+  /** True while the deletion of the log waits for another tab. */
+  @state() private isDeletionBlocked = false;
   /** True if the server did not send the data. */
   @state() private hasDownloadFailed = false;
   private readonly scanner = new Scanner(this, () => this.choices());
@@ -184,9 +186,14 @@ export class ChaicStudy extends LitElement {
   /** The participant agrees: the log comes into being. */
   private async agree(): Promise<void> {
     const { format, version, chaic, digest, server } = this.content!;
-    if (server) this.waits = "entry";
+    // Without storage, the consent stays, with the reason.
     const log = await StudyLog.open(this.logName(), true);
     if (!log) return;
+    this.problem = undefined;
+    if (this.hasLeft) {
+      await this.deleteLog(log);
+      return;
+    }
     if (server) {
       await this.enter(log);
       return;
@@ -210,7 +217,7 @@ export class ChaicStudy extends LitElement {
       await this.enter(log);
     } else if (entry === "full") {
       this.entering = undefined;
-      await log.delete();
+      await this.deleteLog(log);
       this.waits = "full";
       this.focusHeading();
     } else if (entry.start.type === "start" && this.takeSlot(entry.start.slot)) {
@@ -255,8 +262,14 @@ export class ChaicStudy extends LitElement {
     const identity = await log?.readIdentity();
     this.focusHeading();
     if (log && identity) await this.deleteEverywhere(log, identity);
-    else await log?.delete();
+    else if (log) await this.deleteLog(log);
     this.waits = undefined;
+  }
+
+  /** Deletes a log, and shows if this waits for another tab. */
+  private async deleteLog(log: StudyLog): Promise<void> {
+    await log.delete(() => (this.isDeletionBlocked = true));
+    this.isDeletionBlocked = false;
   }
 
   /** Deletes the data in this browser, then those on the server. A reload goes on with what is left. */
@@ -264,16 +277,16 @@ export class ChaicStudy extends LitElement {
     await log.setIdentity({ ...identity, isLeaving: true });
     await log.clear();
     await new Participant(identity).delete();
-    await log.delete();
+    await this.deleteLog(log);
   }
 
   /** Removes the copy in this browser after the end, for example before the next participant. */
   private async removeCopy(): Promise<void> {
     const { log } = this;
     this.upload?.stop();
+    if (log) await this.deleteLog(log);
     this.log = undefined;
     this.waits = "removed";
-    await log?.delete();
     this.focusHeading();
   }
 
@@ -308,6 +321,8 @@ export class ChaicStudy extends LitElement {
       startSimulator: isSimulatedByServer ? (receive) => this.startSimulator(step.number, receive) : undefined,
     };
     this.playing = "running";
+    // The pressed button is gone.
+    void this.updateComplete.then(() => this.player?.focus({ preventScroll: true }));
   }
 
   /** Starts the simulator on the server. It waits until the server knows that the episode has begun. */
@@ -378,15 +393,18 @@ export class ChaicStudy extends LitElement {
           ? html`<p class="problem" role="alert">The study cannot go on: ${this.problem}</p>`
           : nothing}
         <p class="small" role="status">${progress}</p>
-        <p class="small" role="status">${this.connection()}</p>
+        <p class="small" role="status">${this.delay()}</p>
         ${this.current()}
       </section>
       ${this.question()}
     </div>`;
   }
 
-  /** Says that the connection to the server is lost, and what the participant can do. */
-  private connection(): string {
+  /** Says what is delayed by another tab or a lost connection, and what the participant can do. */
+  private delay(): string {
+    if (this.isDeletionBlocked) {
+      return "This study is open in another tab, so the data in this browser are not deleted yet. Close that tab.";
+    }
     const isPlaying = this.playing === "running" && this.isSimulatedByServer();
     if (this.hasLeft || !(this.upload?.state === "waiting" || (isPlaying && this.isConnectionLost))) return "";
     return isPlaying
@@ -454,7 +472,7 @@ export class ChaicStudy extends LitElement {
   /** Says how far the deletion of all data is. */
   private deletion({ server }: StudyContent): string {
     if (this.waits !== "deletion") return `All your data ${this.places()} are deleted. You may close this page.`;
-    if (!server) return "Your data are being deleted. Keep this page open.";
+    if (!server || this.isDeletionBlocked) return "Your data are being deleted. Keep this page open.";
     return "The server has not confirmed the deletion yet. Keep this page open, or open it again later.";
   }
 

@@ -18,6 +18,8 @@ let player: Player | undefined;
 let live: Live | undefined;
 let episode: Uint8Array | undefined;
 let isRerunning = false;
+/** Number of lines of the trace that requests for parts of it have returned. */
+let nReturnedLines = 0;
 /** Trap of the module, which runs no further tasks. */
 let trap: WebAssembly.RuntimeError | undefined;
 /** Frames that are drawn once in advance, so that browsers optimize the module before a person seeks. */
@@ -63,7 +65,7 @@ function answer(request: Request): void {
       advance(request);
       break;
     case "trace":
-      send({ type: "trace", trace: live?.trace() ?? "" });
+      send({ type: "trace", trace: request.isPartial ? newLines() : (live?.trace() ?? "") });
       break;
     case "continue":
       initSync({ module: request.module });
@@ -148,6 +150,14 @@ function play(request: Extract<Request, { type: "play" }>): void {
   send({ type: "playing", info: JSON.parse(live.info()) });
 }
 
+/** Returns the lines of the trace since the last call. */
+function newLines(): string {
+  if (!live) return "";
+  const lines = live.trace_after(nReturnedLines);
+  nReturnedLines = live.n_lines();
+  return lines;
+}
+
 function advance({ frames, viewPx, input }: Extract<Request, { type: "advance" }>): void {
   if (!live) return;
   if (input && "plan" in input) live.choose_plan(input.plan);
@@ -161,7 +171,8 @@ function advance({ frames, viewPx, input }: Extract<Request, { type: "advance" }
 /** Describes a problem; a trap of the module is a bug. */
 function described(problem: unknown): string {
   if (problem instanceof WebAssembly.RuntimeError) {
-    return `the simulator has stopped (${problem.message}). This is a bug in chaic; please report it`;
+    const advice = "This is a bug in chaic: please report it. Load this page again to go on";
+    return `the simulator has stopped (${problem.message}). ${advice}`;
   }
   return problem instanceof Error ? problem.message : String(problem);
 }

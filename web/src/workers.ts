@@ -16,13 +16,14 @@ export function startWorker(
   return worker;
 }
 
-/** Sends one request to a worker of its own, and returns the response. */
-export function ask(program: string, request: Request): Promise<Response> {
+/** Sends one request to a worker of its own, and returns the response. An abort ends the worker and returns undefined. */
+export function ask(program: string, request: Request, signal: AbortSignal): Promise<Response | undefined> {
   return new Promise((resolve) => {
-    const answered = (response: Response): void => {
+    const answered = (response?: Response): void => {
       worker.terminate();
       resolve(response);
     };
+    signal.addEventListener("abort", () => answered());
     const failed = (message: string): void => answered({ type: "error", message });
     const worker = startWorker(program, answered, failed);
     worker.postMessage(request);

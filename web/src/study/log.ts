@@ -22,6 +22,15 @@ function settled<T>(request: IDBRequest<T>): Promise<T> {
   });
 }
 
+/** Describes why the browser does not store data, and what helps. */
+function refusal(problem: unknown): Error {
+  const reason = problem instanceof Error ? `${problem.name}: ${problem.message}` : "no reason given";
+  return new Error(
+    `this browser does not store your data (${reason}). ` +
+      "Use a window that is not private, let this page store data, or free space on the disk. Then load this page again",
+  );
+}
+
 /** Longest time for which a reload waits for the page before it, milliseconds. */
 const LOCK_MS = 3000;
 
@@ -42,6 +51,10 @@ export function lock(name: string): Promise<boolean> {
 export class StudyLog {
   /** Number of records that the browser has stored. */
   nStored: number;
+  /** Why the log takes no further records: the data have no gaps. */
+  private failure?: Error;
+  /** True if another tab deletes this log. */
+  private isClosed = false;
 
   private constructor(
     private readonly name: string,
@@ -50,40 +63,52 @@ export class StudyLog {
     readonly records: DataRecord[],
   ) {
     this.nStored = records.length;
+    // Otherwise the deletion in another tab would wait for this one.
+    database.onversionchange = () => {
+      database.close();
+      this.isClosed = true;
+      this.failure = new Error("its data were deleted in another tab. Load this page again");
+    };
   }
 
-  /** Opens the log with a name. Without `mayCreate`, returns undefined if it does not exist, and creates nothing. */
+  /**
+   * Opens the log with a name. Without `mayCreate`, returns undefined if it does not exist, and creates nothing. Throws
+   * if the browser stores no data, for example in a private window.
+   */
   static async open(name: string, mayCreate: boolean): Promise<StudyLog | undefined> {
-    const request = indexedDB.open(name, 1);
-    let isRefused = false;
-    request.onupgradeneeded = () => {
-      if (mayCreate) {
-        request.result.createObjectStore(STORE, { autoIncrement: true });
-        request.result.createObjectStore(IDENTITY);
-      } else {
-        isRefused = true;
-        // The database does not come into being.
-        request.transaction!.abort();
-      }
-    };
+    let isAbsent = false;
     try {
+      // Some browsers refuse the call, others the request.
+      const request = indexedDB.open(name, 1);
+      request.onupgradeneeded = () => {
+        if (mayCreate) {
+          request.result.createObjectStore(STORE, { autoIncrement: true });
+          request.result.createObjectStore(IDENTITY);
+        } else {
+          isAbsent = true;
+          // The database does not come into being.
+          request.transaction!.abort();
+        }
+      };
       const database = await settled(request);
       const records = await settled(database.transaction(STORE).objectStore(STORE).getAll());
       return new StudyLog(name, database, records as DataRecord[]);
     } catch (problem) {
-      if (isRefused) return undefined;
-      throw problem;
+      if (isAbsent) return undefined;
+      throw refusal(problem);
     }
   }
 
   /** Appends a record; resolves when the browser has stored it. */
   async append(record: DataRecord): Promise<void> {
+    if (this.failure) throw this.failure;
     this.records.push(record);
     try {
       await this.change(STORE, (store) => store.add(record));
     } catch (problem) {
       // The numbers of later records stay those of the database.
       this.records.splice(this.records.indexOf(record), 1);
+      this.failure ??= problem instanceof Error ? problem : refusal(problem);
       throw problem;
     }
     this.nStored += 1;
@@ -92,7 +117,7 @@ export class StudyLog {
   /** Returns the identity at the server of the study, if there is one. */
   async readIdentity(): Promise<Identity | undefined> {
     // Logs of earlier versions have no such store.
-    if (!this.database.objectStoreNames.contains(IDENTITY)) return undefined;
+    if (this.isClosed || !this.database.objectStoreNames.contains(IDENTITY)) return undefined;
     const found = await settled(this.database.transaction(IDENTITY).objectStore(IDENTITY).get(IDENTITY_KEY));
     return found as Identity | undefined;
   }
@@ -114,15 +139,18 @@ export class StudyLog {
       // The server must not have a record that this browser loses when its machine stops.
       const transaction = this.database.transaction(name, "readwrite", { durability: "strict" });
       transaction.oncomplete = () => resolve();
-      transaction.onabort = transaction.onerror = () => reject(transaction.error);
+      // A request that fails aborts the transaction, which has its error then.
+      transaction.onabort = () => reject(refusal(transaction.error));
       change(transaction.objectStore(name));
     });
   }
 
-  /** Deletes the log with all records. */
-  async delete(): Promise<void> {
+  /** Deletes the log with all records. `onBlocked` is called if the deletion waits for another tab. */
+  async delete(onBlocked: () => void): Promise<void> {
     this.database.close();
-    await settled(indexedDB.deleteDatabase(this.name));
+    const request = indexedDB.deleteDatabase(this.name);
+    request.onblocked = onBlocked;
+    await settled(request);
     this.records.length = 0;
   }
 

@@ -191,6 +191,16 @@ impl Live {
         self.session.trace()
     }
 
+    /// Returns the trace so far without its first `n_lines` lines.
+    pub fn trace_after(&self, n_lines: usize) -> String {
+        self.session.trace_after(n_lines)
+    }
+
+    /// Returns the number of lines of the trace so far.
+    pub fn n_lines(&self) -> usize {
+        self.session.n_lines()
+    }
+
     /// Returns the delivered fraction of the goal of this episode (JSON) with a built-in helper and a
     /// simulated partner, from the start.
     ///

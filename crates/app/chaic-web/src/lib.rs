@@ -12,6 +12,7 @@
 #[cfg(target_arch = "wasm32")]
 mod bindings;
 mod drawing;
+mod keyframes;
 mod limits;
 mod live;
 mod memory_history;

@@ -16,6 +16,9 @@ use serde::Serialize;
 
 /// Maximum number of stored changes of maps, 12 bytes each: far above those of an episode.
 const MAX_CHANGES: usize = 4 << 20;
+/// Maximum number of objects, people and points of paths in all stored memories, about 100 bytes each: far above
+/// that of an episode of ordinary length.
+const MAX_REMEMBERED: usize = 2 << 20;
 
 /// Agreement of an agent that runs again with the replay.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -87,6 +90,8 @@ struct AgentHistory {
     map: Option<ExploredMap>,
     changes: Vec<CellChange>,
     moments: Vec<RerunMoment>,
+    /// Number of objects, people and points of paths in all moments.
+    n_remembered: usize,
 }
 
 struct CellChange {
@@ -102,8 +107,13 @@ impl MemoryHistory {
     /// If the episode is not the one of the trace.
     pub fn new(trace: Arc<Trace>, episode: &Episode) -> Result<MemoryHistory, EnvError> {
         let rerun = AgentRerun::new(trace, episode, &BuiltInHelpers)?;
-        let history =
-            |agent| AgentHistory { agent, map: None, changes: Vec::new(), moments: Vec::new() };
+        let history = |agent| AgentHistory {
+            agent,
+            map: None,
+            changes: Vec::new(),
+            moments: Vec::new(),
+            n_remembered: 0,
+        };
         let agents = rerun.statuses().map(|(agent, _)| history(agent)).collect();
         Ok(MemoryHistory { rerun, is_complete: false, agents })
     }
@@ -126,7 +136,8 @@ impl MemoryHistory {
                 }
             }
             let n_changes: usize = self.agents.iter().map(|history| history.changes.len()).sum();
-            self.is_complete = n_changes > MAX_CHANGES;
+            let n_remembered: usize = self.agents.iter().map(|history| history.n_remembered).sum();
+            self.is_complete = n_changes > MAX_CHANGES || n_remembered > MAX_REMEMBERED;
             break;
         }
         !self.is_complete
@@ -236,6 +247,9 @@ impl AgentHistory {
                 self.changes.push(CellChange { frame, cell: cell as u32, content: new });
             }
         }
+        let memory = &moment.memory;
+        // A moment without a memory takes space, too.
+        self.n_remembered += 1 + memory.objects.len() + memory.people.len() + memory.path.len();
         self.moments.push(moment);
     }
 

@@ -17,12 +17,11 @@ use chaic_world::World;
 use serde::Serialize;
 
 use crate::drawing::{CanvasLabel, DrawnImage, DrawnMap};
+use crate::keyframes::Keyframes;
 use crate::limits::{TaskObject, task_objects};
 use crate::memory_history::{MemoryHistory, MemoryState, RerunInfo, rounded};
 use crate::timeline::Timeline;
 
-/// Distance between stored states, frames: the time to any frame is that of this many frames.
-const KEYFRAME_INTERVAL: Frame = 100;
 /// Distance between the points of a trail, frames.
 const TRAIL_INTERVAL: Frame = 10;
 
@@ -152,8 +151,7 @@ pub struct ReplayPlayer {
     current: Playback<Arc<Trace>>,
     /// State at the last frame that is verified.
     verified: Playback<Arc<Trace>>,
-    /// States at multiples of [`KEYFRAME_INTERVAL`].
-    keyframes: Vec<Playback<Arc<Trace>>>,
+    keyframes: Keyframes<Playback<Arc<Trace>>>,
     timeline: Timeline,
     trails: Vec<Vec<[f32; 2]>>,
     /// Why the re-simulation stopped, or the trace is incomplete.
@@ -183,7 +181,7 @@ impl ReplayPlayer {
             scene,
             plan: None,
             current: start.clone(),
-            keyframes: vec![start.clone()],
+            keyframes: Keyframes::new(start.clone()),
             verified: start,
             timeline: Timeline::default(),
             trails,
@@ -220,9 +218,7 @@ impl ReplayPlayer {
             }
         }
         let frame = self.verified.world().state().frame;
-        if frame.is_multiple_of(KEYFRAME_INTERVAL) {
-            self.keyframes.push(self.verified.clone());
-        }
+        self.keyframes.add(frame, &self.verified);
         if frame.is_multiple_of(TRAIL_INTERVAL) {
             add_positions(&mut self.trails, self.verified.world());
         }
@@ -283,9 +279,8 @@ impl ReplayPlayer {
     pub fn seek(&mut self, frame: Frame) -> Result<(), PlayerError> {
         let frame = frame.min(self.verified.world().state().frame);
         let now = self.current.world().state().frame;
-        let keyframe = (frame / KEYFRAME_INTERVAL) as usize;
-        if frame < now || frame / KEYFRAME_INTERVAL > now / KEYFRAME_INTERVAL {
-            self.current = self.keyframes[keyframe.min(self.keyframes.len() - 1)].clone();
+        if let Some(start) = self.keyframes.start_for(frame, now) {
+            self.current = start.clone();
         }
         while self.current.world().state().frame < frame && self.current.step()?.is_some() {}
         Ok(())

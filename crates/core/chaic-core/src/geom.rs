@@ -104,6 +104,7 @@ pub fn horizontal_distance(a: Vec3, b: Vec3) -> f32 {
 
 /// Pose of an agent: feet on the ground at `position`, facing `yaw_rad`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct Pose {
     /// Position of the feet in the world, meters.
     #[schemars(with = "[f32; 3]")]
@@ -126,6 +127,7 @@ impl Pose {
 
 /// An axis-aligned rectangle in plan.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct Rect {
     /// Smallest x and z, meters.
     #[schemars(with = "[f32; 2]")]
@@ -239,6 +241,16 @@ mod tests {
         for x in steps.chain(near).chain([f32::MIN_POSITIVE, 0.5, 1e-7, 4_194_303.5, 4_194_304.0]) {
             assert_eq!(math::floor_small(x), x.floor() as i32, "{x}");
         }
+    }
+
+    #[test]
+    fn unknown_fields_are_refused() {
+        let pose = r#"{"position": [0.0, 0.0, 0.0], "yaw_rad": 0.0, "yaw_deg": 90.0}"#;
+        let error = serde_json::from_str::<Pose>(pose).unwrap_err().to_string();
+        assert!(error.contains("unknown field `yaw_deg`"), "{error}");
+        let rect = r#"{"min": [0.0, 0.0], "max": [1.0, 1.0], "size": [1.0, 1.0]}"#;
+        let error = serde_json::from_str::<Rect>(rect).unwrap_err().to_string();
+        assert!(error.contains("unknown field `size`"), "{error}");
     }
 
     #[test]

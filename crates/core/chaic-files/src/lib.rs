@@ -19,6 +19,7 @@ pub use output_file::OutputFile;
 mod change;
 pub mod faults;
 mod lock;
+mod temporary_file;
 
 use std::ffi::OsString;
 use std::fs;
@@ -27,6 +28,7 @@ use std::path::{Path, PathBuf};
 
 pub use change::{create_folders, remove_empty_folder, remove_file, remove_folder, rename};
 pub use lock::{FolderLock, LOCK, LockError};
+pub use temporary_file::{TEMPORARY_SUFFIX, TemporaryFile};
 
 use crate::faults::perform_rename;
 
@@ -56,25 +58,18 @@ impl FileError {
 /// Result of the functions of this crate.
 pub type Result<T> = std::result::Result<T, FileError>;
 
-/// Suffix of the temporary file of [`write_atomically`].
-pub const TEMPORARY_SUFFIX: &str = ".tmp";
-
-/// Writes a file atomically: to a temporary file in the same folder, which is then renamed. A link
-/// with either name is replaced, not followed.
+/// Writes a file atomically: to a [`TemporaryFile`], which is then renamed. A link with either name is
+/// replaced, not followed. Other processes may write the same file; the last rename remains.
 ///
 /// # Errors
 /// If the file system refuses. The temporary file is then removed if possible.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
-    let temporary = with_suffix(path, TEMPORARY_SUFFIX);
     let write = || -> io::Result<()> {
-        write_and_sync(create_or_replace(&temporary)?, bytes)?;
-        perform_rename(&temporary, path, || fs::rename(&temporary, path))
+        let mut file = TemporaryFile::beside(path)?;
+        file.write_all(bytes)?;
+        file.commit()
     };
-    write().map_err(|error| {
-        // If the removal fails too, the suffix marks the file as temporary.
-        let _ = remove_file(&temporary);
-        FileError::context("write", path)(error)
-    })
+    write().map_err(FileError::context("write", path))
 }
 
 /// Writes a new file that only its owner may read, atomically, even if another process writes it too:
@@ -87,7 +82,9 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
 pub fn write_new_private(path: &Path, bytes: &[u8]) -> Result<()> {
     let temporary = with_suffix(path, &format!(".{}{TEMPORARY_SUFFIX}", std::process::id()));
     let write = || -> io::Result<()> {
-        write_and_sync(open::create_private(&temporary)?, bytes)?;
+        let mut file = open::create_private(&temporary)?;
+        file.write_all(bytes)?;
+        file.sync_all()?;
         perform_rename(&temporary, path, || change::rename_new(&temporary, path))
     };
     write().map_err(|error| {
@@ -95,11 +92,6 @@ pub fn write_new_private(path: &Path, bytes: &[u8]) -> Result<()> {
         let _ = remove_file(&temporary);
         FileError::context("create", path)(error)
     })
-}
-
-fn write_and_sync(mut file: OutputFile, bytes: &[u8]) -> io::Result<()> {
-    file.write_all(bytes)?;
-    file.sync_all()
 }
 
 /// Returns the entries of a folder, sorted by name.

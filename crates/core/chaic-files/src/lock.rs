@@ -8,6 +8,9 @@ use crate::{FileError, OutputFile, open_or_create};
 /// Name of the lock file in a locked folder.
 pub const LOCK: &str = ".lock";
 
+/// Maximum number of lock files that are opened and found removed before the folder counts as in use.
+const MAX_ATTEMPTS: usize = 8;
+
 /// Exclusive lock on a folder, held until it is dropped or the process ends.
 ///
 /// The operating system holds the lock on the file [`LOCK`], so a killed process leaves no lock
@@ -36,12 +39,24 @@ impl FolderLock {
     /// opened or is no regular file.
     pub fn acquire(folder: &Path) -> Result<FolderLock, LockError> {
         let path = folder.join(LOCK);
-        let file = open_or_create(&path)?;
-        match file.as_file().try_lock() {
-            Ok(()) => Ok(FolderLock { _file: file }),
-            Err(TryLockError::WouldBlock) => Err(LockError::Held(folder.to_owned())),
-            Err(TryLockError::Error(error)) => Err(FileError::context("lock", &path)(error).into()),
+        for _ in 0..MAX_ATTEMPTS {
+            let file = open_or_create(&path)?;
+            if lock(&file, folder, &path)? {
+                return Ok(FolderLock { _file: file });
+            }
         }
+        Err(LockError::Held(folder.to_owned()))
+    }
+}
+
+/// Locks an opened lock file. Returns false if the holder of the lock removed the file after it was
+/// opened: another process may hold a lock on a new file.
+fn lock(file: &OutputFile, folder: &Path, path: &Path) -> Result<bool, LockError> {
+    let refused = |error| LockError::File(FileError::context("lock", path)(error));
+    match file.as_file().try_lock() {
+        Ok(()) => file.has_its_name().map_err(refused),
+        Err(TryLockError::WouldBlock) => Err(LockError::Held(folder.to_owned())),
+        Err(TryLockError::Error(error)) => Err(refused(error)),
     }
 }
 
@@ -59,6 +74,19 @@ mod tests {
         assert!(matches!(error, LockError::Held(_)) && error.to_string().contains("in use"));
         drop(lock);
         FolderLock::acquire(dir.path()).unwrap();
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_removed_lock_file_gives_no_lock() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join(LOCK);
+        let opened = open_or_create(&path).unwrap();
+        fs::remove_file(&path).unwrap();
+        assert!(!lock(&opened, dir.path(), &path).unwrap());
+        // A new lock file of another process does not change that.
+        let _held = FolderLock::acquire(dir.path()).unwrap();
+        assert!(!lock(&opened, dir.path(), &path).unwrap());
     }
 
     #[test]

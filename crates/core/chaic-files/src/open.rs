@@ -129,8 +129,25 @@ fn create(path: &Path, options: &mut OpenOptions) -> io::Result<OutputFile> {
             _ => {}
         }
     }
+    create_missing(path, options)
+}
+
+/// Creates an empty file whose name must be free.
+pub(crate) fn create_new(path: &Path) -> io::Result<OutputFile> {
+    create_missing(path, File::options().write(true))
+}
+
+fn create_missing(path: &Path, options: &mut OpenOptions) -> io::Result<OutputFile> {
     // `create_new` is O_EXCL, which refuses a link that was created in the meantime.
     let file = perform(Operation::Open, path, || options.create_new(true).open(path))?;
+    Ok(OutputFile::new(file, path))
+}
+
+/// Opens an existing file to lock it. Links are not followed.
+pub(crate) fn open_existing(path: &Path) -> io::Result<OutputFile> {
+    let mut options = File::options();
+    // Some file systems lock only files that are open for writing.
+    let file = without_blocking(&mut options, true).read(true).write(true).open(path)?;
     Ok(OutputFile::new(file, path))
 }
 

@@ -23,6 +23,26 @@ impl OutputFile {
         &self.file
     }
 
+    /// Returns whether the path of the file still leads to it. Another process may have removed or
+    /// renamed it, or created another file of this name.
+    #[cfg(unix)]
+    pub(crate) fn has_its_name(&self) -> io::Result<bool> {
+        use std::io::ErrorKind;
+        use std::os::unix::fs::MetadataExt as _;
+        let own = self.file.metadata()?;
+        match std::fs::symlink_metadata(&self.path) {
+            Ok(found) => Ok((found.dev(), found.ino()) == (own.dev(), own.ino())),
+            Err(e) if e.kind() == ErrorKind::NotFound => Ok(false),
+            Err(e) => Err(e),
+        }
+    }
+
+    /// Other systems have no portable identity of files.
+    #[cfg(not(unix))]
+    pub(crate) fn has_its_name(&self) -> io::Result<bool> {
+        Ok(true)
+    }
+
     /// Truncates or extends the file to a length in bytes.
     ///
     /// # Errors

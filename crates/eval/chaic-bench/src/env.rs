@@ -103,8 +103,8 @@ impl EnvBench {
                 match outcome {
                     Ok(AdvanceOutcome::NeedsAction) => {}
                     Ok(AdvanceOutcome::Ended | AdvanceOutcome::Stopped) => {
-                        n_ended += 1;
                         batch.reset(k, self.setup.config(&bundled, envs + n_ended))?;
+                        n_ended += 1;
                     }
                     Err(error) => return Err(EvalError::Options(error.to_string())),
                 }

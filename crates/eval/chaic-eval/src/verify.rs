@@ -579,3 +579,6 @@ fn mismatch(
     let problem = problem + &context;
     Mismatch { path: path.to_owned(), frame, agent, problem }
 }
+
+#[cfg(test)]
+mod tests;

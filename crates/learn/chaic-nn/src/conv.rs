@@ -45,7 +45,7 @@ pub struct Im2colBuffers {
     patches: Vec<f32>,
     product: Workspace,
     weights: PackedMatrix,
-    edges: Vec<f32>,
+    pub(crate) edges: Vec<f32>,
 }
 
 /// Packs weights of shape [size, size, channels, out channels] for [`ForwardRows`].
@@ -77,7 +77,7 @@ pub fn forward(
 ) {
     let Im2colBuffers { weights: packed, edges, .. } = buffers;
     pack(arch, weights, kernel, input.shape.channels, packed);
-    convolve(arch, input, packed, bias, kernel, out, edges);
+    forward_packed(arch, input, packed, bias, kernel, out, edges);
 }
 
 /// Convolves maps as [`forward`], with weights of [`pack`].
@@ -85,18 +85,6 @@ pub fn forward(
 /// # Panics
 /// As [`forward`].
 pub(crate) fn forward_packed(
-    arch: Arch,
-    input: TensorView<'_>,
-    packed: &PackedMatrix,
-    bias: Option<&[f32]>,
-    kernel: Kernel,
-    out: &mut [f32],
-    buffers: &mut Im2colBuffers,
-) {
-    convolve(arch, input, packed, bias, kernel, out, &mut buffers.edges);
-}
-
-fn convolve(
     arch: Arch,
     input: TensorView<'_>,
     packed: &PackedMatrix,

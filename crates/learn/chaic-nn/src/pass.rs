@@ -1,5 +1,6 @@
 //! Forward and backward passes for training.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use pulp::Arch;
@@ -7,7 +8,7 @@ use pulp::Arch;
 use crate::attention::{Attention, AttentionGrad};
 use crate::conv::{self, Im2colBuffers};
 use crate::depthwise::{self, Padded, Zeros};
-use crate::elementwise::{AddTo, Relu, ReluGrad, downsample, upsample};
+use crate::elementwise::{AddTo, Relu, ReluGrad, Sum, downsample, upsample};
 use crate::gemm::PackedMatrix;
 use crate::inference::pack_weights;
 use crate::network::{Layer, Network, Node};
@@ -99,25 +100,78 @@ impl Pass {
     /// multiple of [`Network::stride`], or the groups do not add up to the rows of an attention
     /// layer.
     pub fn forward_all(&mut self, network: &Network, parameters: &[f32], inputs: &[&Tensor]) {
-        let input = inputs[0];
-        let Shape { height, width, .. } = input.shape;
+        self.forward_up_to(network, parameters, inputs, Node(network.layers.len() - 1));
+    }
+
+    /// Runs the layers up to a node on the inputs of a network, as [`Pass::forward_all`].
+    ///
+    /// # Panics
+    /// As [`Pass::forward_all`].
+    pub fn forward_up_to(
+        &mut self,
+        network: &Network,
+        parameters: &[f32],
+        inputs: &[&Tensor],
+        last: Node,
+    ) {
+        let shape = inputs[0].shape;
+        let Shape { height, width, .. } = shape;
         let stride = network.stride();
         assert!(
             height.is_multiple_of(stride) && width.is_multiple_of(stride),
             "{width} x {height} pixels are not multiples of {stride}"
         );
+        self.run_layers(network, parameters, inputs, shape, 0..last.0 + 1);
+    }
+
+    /// Runs the layers after a node on one map of a batch. The pass `batch` has run the layers up to
+    /// the node ([`Pass::forward_up_to`]). Activations are bit-identical to those of a whole batch.
+    ///
+    /// # Panics
+    /// If there are inputs after the node, or a layer combines maps of the batch.
+    pub fn forward_map_after(
+        &mut self,
+        network: &Network,
+        parameters: &[f32],
+        batch: &Pass,
+        last: Node,
+        map: usize,
+    ) {
+        let first = last.0 + 1;
+        let input_shape = Shape { n: 1, ..batch.activations[0].shape };
+        let read = network.layers[first..].iter().flat_map(Layer::inputs);
+        for from in read.filter(|from| from.0 < first) {
+            let shape = network.shape_of(from, input_shape);
+            assert_eq!(shape.n, 1, "a layer combines maps of the batch");
+            let (to, n) = (&mut self.activations[from.0], shape.len());
+            to.reshape(shape);
+            to.data.copy_from_slice(&batch.activations[from.0].data[map * n..][..n]);
+        }
+        self.run_layers(network, parameters, &[], input_shape, first..network.layers.len());
+    }
+
+    /// Runs some layers; the first input of the network has the shape `input_shape`.
+    fn run_layers(
+        &mut self,
+        network: &Network,
+        parameters: &[f32],
+        inputs: &[&Tensor],
+        input_shape: Shape,
+        layers: Range<usize>,
+    ) {
         let values = |parameter: usize| &parameters[network.parameters()[parameter].range.clone()];
-        for (k, layer) in network.layers.iter().enumerate() {
+        for k in layers {
             let (earlier, later) = self.activations.split_at_mut(k);
             let out = &mut later[0];
-            out.reshape(network.shape_of(Node(k), input.shape));
-            match *layer {
+            out.reshape(network.shape_of(Node(k), input_shape));
+            match network.layers[k] {
                 Layer::Input { index } => out.data.copy_from_slice(&inputs[index].data),
                 Layer::Conv { from, weights, bias, kernel, .. } => {
                     let (input, out) = (earlier[from.0].view(), &mut out.data);
                     let (arch, bias, buffers) = (self.arch, bias.map(values), &mut self.im2col);
                     if let Some(packed) = self.packed.get(k) {
-                        conv::forward_packed(arch, input, packed, bias, kernel, out, buffers);
+                        let edges = &mut buffers.edges;
+                        conv::forward_packed(arch, input, packed, bias, kernel, out, edges);
                     } else {
                         conv::forward(arch, input, values(weights), bias, kernel, out, buffers);
                     }
@@ -141,8 +195,8 @@ impl Pass {
                     self.arch.dispatch(Relu { input, out: &mut out.data });
                 }
                 Layer::Add { a, b } => {
-                    out.data.copy_from_slice(&earlier[a.0].data);
-                    self.arch.dispatch(AddTo { to: &mut out.data, from: &earlier[b.0].data });
+                    let [a, b] = [a, b].map(|node| &earlier[node.0].data[..]);
+                    self.arch.dispatch(Sum { a, b, out: &mut out.data });
                 }
                 Layer::Upsample { from } => {
                     let Tensor { data, shape } = &earlier[from.0];

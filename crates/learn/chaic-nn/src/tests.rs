@@ -189,6 +189,30 @@ fn passes_with_constant_parameters_are_bit_identical() {
     }
 }
 
+#[test]
+fn maps_that_run_alone_after_any_node_are_bit_identical_to_those_of_the_batch() {
+    for ((net, head), first) in
+        [(network_with_strided_layers(), INPUT), (network_with_inputs(), SMALL)]
+    {
+        let parameters = net.init_parameters(3);
+        let inputs = inputs(&net, first);
+        let inputs: Vec<&Tensor> = inputs.iter().collect();
+        let mut whole = Pass::new(&net, widest());
+        whole.forward_all(&net, &parameters, &inputs);
+        let expected = whole.activation(head);
+        for last in (inputs.len() - 1..head.0).map(Node) {
+            let mut batch = Pass::new(&net, widest());
+            batch.forward_up_to(&net, &parameters, &inputs, last);
+            let mut single = Pass::with_constant_parameters(&net, &parameters, widest());
+            let maps = expected.data.chunks_exact(expected.shape.len_per_item());
+            for (map, expected) in maps.enumerate().rev() {
+                single.forward_map_after(&net, &parameters, &batch, last, map);
+                assert!(single.activation(head).data == expected, "map {map} after {last:?}");
+            }
+        }
+    }
+}
+
 /// The brightness level (one of five) of each pixel can be learned in a few steps.
 #[test]
 fn a_network_learns() {

@@ -307,15 +307,15 @@ impl Pixels {
             union(&mut parents, a as usize, b as usize);
         }
         let mut parts: Vec<Vec<u32>> = Vec::new();
-        let mut part_of = vec![usize::MAX; pixels.len()];
+        // Number of the part by its first pixel, which comes before the others of the part.
+        let mut part_of_first = vec![0; pixels.len()];
         for k in objects.pixels.iter().map(|k| *k as usize) {
             let first = find_root(&mut parents, k);
             if first == k {
-                part_of[k] = parts.len();
+                part_of_first[k] = parts.len();
                 parts.push(Vec::new());
             }
-            part_of[k] = part_of[first];
-            parts[part_of[k]].push(k as u32);
+            parts[part_of_first[first]].push(k as u32);
         }
         // The largest part comes first and determines the label; smaller ones join it.
         parts.sort_by_key(|part| (std::cmp::Reverse(part.len()), part[0]));

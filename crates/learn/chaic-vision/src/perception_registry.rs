@@ -140,13 +140,14 @@ fn factory_from_name(name: &str) -> Result<Arc<dyn PerceptionFactory>, Perceptio
     if let Some(path) = file_of(name, NOISY) {
         let rates_error =
             |problem: String| PerceptionError::Rates { path: path.to_owned(), problem };
-        let rates: DetectorNoiseModel = serde_json::from_slice(&read_user_file(path, MAX_BYTES)?)
-            .map_err(|e| rates_error(e.to_string()))?;
+        let bytes = read_user_file(path, MAX_BYTES)?;
+        let rates: DetectorNoiseModel =
+            serde_json::from_slice(&bytes).map_err(|e| rates_error(e.to_string()))?;
         rates.check().map_err(rates_error)?;
-        return Ok(Arc::new(NoisyPerceptionFactory::new(
-            rates,
-            format!("{NOISY} {}", path.display()),
-        )));
+        // The digest in the recorded name shows if the file has changed since.
+        let recorded_name =
+            format!("{NOISY} {} {}", path.display(), chaic_nn::weights::digest(&bytes));
+        return Ok(Arc::new(NoisyPerceptionFactory::new(rates, recorded_name)));
     }
     Err(PerceptionError::Unknown(format!(
         "no perception `{name}`; write {GROUND_TRUTH}, {GT_TRACKS}, {GT_MASKS}, {GT_NAMES}, \

@@ -21,7 +21,8 @@ const EMBEDDING_WIDTH: usize = 256;
 /// Predicted overlaps with the object: of the proposal's mask and of the redrawn mask.
 pub const N_QUALITIES: usize = 2;
 
-/// Network of the second stage: 12 million multiplications per proposal.
+/// Network of the second stage: 12 million multiplications per proposal. The layers of the mask
+/// follow those of labels and qualities, so that they can run for some proposals only.
 #[derive(Clone, Debug)]
 pub struct RoiNetwork {
     /// All layers. Inputs are crops and scalars.

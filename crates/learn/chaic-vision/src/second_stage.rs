@@ -40,71 +40,73 @@ pub struct SecondStage {
     pub parameters: Vec<f32>,
 }
 
-/// Output for a proposal.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RoiOutput {
-    /// Probability of each label.
-    pub probabilities: Vec<f32>,
-    /// Predicted intersection over union of the proposal's mask and of the redrawn mask with the
-    /// object.
-    pub qualities: [f32; N_QUALITIES],
-    /// Logits of the redrawn mask, shape [`SIDE`, `SIDE`].
-    pub mask: Vec<f32>,
+/// Buffers of the second stage.
+#[derive(Clone, Debug)]
+pub struct SecondStageInference {
+    /// Crops and scalars of a batch.
+    inputs: [Tensor; 2],
+    /// Runs the layers of labels and qualities on a batch.
+    encoder: Pass,
+    /// Runs the layers of the redrawn mask on one proposal.
+    mask_decoder: Pass,
 }
 
 impl SecondStage {
     /// Creates buffers for inference with the current parameters.
-    pub fn pass(&self) -> Pass {
-        Pass::with_constant_parameters(&self.network.network, &self.parameters, widest())
+    pub fn inference(&self) -> SecondStageInference {
+        let network = &self.network.network;
+        let encoder = Pass::with_constant_parameters(network, &self.parameters, widest());
+        let mask_decoder = encoder.clone();
+        SecondStageInference { inputs: Default::default(), encoder, mask_decoder }
     }
 
-    /// Runs the network on proposals; `pass` is one of [`SecondStage::pass`].
-    pub fn outputs(
+    /// Returns the candidates among proposals. The mask decoder runs only for those that use the
+    /// redrawn mask.
+    fn candidates(
         &self,
         source: &RoiSource<'_>,
         proposals: &[Segment],
-        pass: &mut Pass,
-    ) -> Vec<(RoiBox, RoiOutput)> {
-        let mut outputs = Vec::with_capacity(proposals.len());
-        let mut inputs: [Tensor; 2] = Default::default();
+        inference: &mut SecondStageInference,
+    ) -> Vec<Candidate> {
+        let SecondStageInference { inputs, encoder, mask_decoder } = inference;
+        let (RoiNetwork { network, labels, qualities, mask }, parameters) =
+            (&self.network, &self.parameters[..]);
+        let mut candidates = Vec::new();
         for batch in proposals.chunks(BATCH_SIZE) {
-            let boxes = fill_inputs(source, batch, &mut inputs);
-            let [crops, scalars] = &inputs;
-            let RoiNetwork { network, labels, qualities, mask } = &self.network;
-            pass.forward_all(network, &self.parameters, &[crops, scalars]);
-            let labels = &pass.activation(*labels).data;
-            let qualities = &pass.activation(*qualities).data;
-            let mask = &pass.activation(*mask).data;
-            let n_labels = labels.len() / batch.len();
-            for (k, roi) in boxes.into_iter().enumerate() {
-                let mut probabilities = labels[k * n_labels..][..n_labels].to_vec();
+            let boxes = fill_inputs(source, batch, inputs);
+            let [crops, scalars] = &*inputs;
+            encoder.forward_up_to(network, parameters, &[crops, scalars], *qualities);
+            let encoder = &*encoder;
+            let logits = &encoder.activation(*labels).data;
+            let n_labels = logits.len() / batch.len();
+            let logits = logits.chunks_exact(n_labels);
+            let scores = encoder.activation(*qualities).data.as_chunks::<N_QUALITIES>().0;
+            let outputs = batch.iter().zip(boxes).zip(logits.zip(scores));
+            for (k, ((proposal, roi), (logits, scores))) in outputs.enumerate() {
+                let mut probabilities = logits.to_vec();
                 softmax(&mut probabilities);
-                let output = RoiOutput {
-                    probabilities,
-                    qualities: std::array::from_fn(|q| sigmoid(qualities[k * N_QUALITIES + q])),
-                    mask: mask[k * SIDE * SIDE..][..SIDE * SIDE].to_vec(),
+                let redraw = || {
+                    mask_decoder.forward_map_after(network, parameters, encoder, *qualities, k);
+                    redrawn_pixels(&mask_decoder.activation(*mask).data, roi, source.pixels)
                 };
-                outputs.push((roi, output));
+                let qualities = scores.map(sigmoid);
+                candidates.extend(Candidate::new(proposal, &probabilities, qualities, redraw));
             }
         }
-        outputs
+        candidates
     }
 
-    /// Returns the objects among proposals, with uncalibrated scores.
+    /// Returns the objects among proposals, with uncalibrated scores; `inference` is one of
+    /// [`SecondStage::inference`].
     pub fn instances(
         &self,
         source: &RoiSource<'_>,
         proposals: &[Segment],
         depth_m: &[f32],
-        pass: &mut Pass,
+        inference: &mut SecondStageInference,
     ) -> Vec<Instance> {
         let pixels = source.pixels;
-        let outputs = self.outputs(source, proposals, pass);
-        let candidates = proposals
-            .iter()
-            .zip(&outputs)
-            .filter_map(|(proposal, (roi, output))| Candidate::new(pixels, proposal, *roi, output));
-        let mut candidates: Vec<Candidate> = candidates.collect();
+        let mut candidates = self.candidates(source, proposals, inference);
         candidates.sort_by(|a, b| {
             b.segment
                 .score
@@ -147,18 +149,17 @@ struct Candidate {
 }
 
 impl Candidate {
-    /// Returns `None` if the score is too low or no pixel is left.
+    /// Returns `None` if the score is too low or no pixel is left. Takes the probability of each
+    /// label, the predicted qualities of both masks, and a function that redraws the mask.
     fn new(
-        pixels: &Pixels,
         proposal: &Segment,
-        roi: RoiBox,
-        output: &RoiOutput,
+        probabilities: &[f32],
+        [original, redrawn]: [f32; N_QUALITIES],
+        redraw: impl FnOnce() -> Vec<u32>,
     ) -> Option<Candidate> {
-        let [original, redrawn] = output.qualities;
         let quality = original.max(redrawn);
-        let mut names: Vec<(u8, f32)> = (1..output.probabilities.len())
-            .map(|label| (label as u8, output.probabilities[label]))
-            .collect();
+        let mut names: Vec<(u8, f32)> =
+            (1..probabilities.len()).map(|label| (label as u8, probabilities[label])).collect();
         names.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         names.truncate(MAX_NAMES);
         let first = *names.first()?;
@@ -170,11 +171,7 @@ impl Candidate {
         if !is_likely {
             return None;
         }
-        let mask = if redrawn > original {
-            redrawn_pixels(&output.mask, roi, pixels)
-        } else {
-            proposal.pixels.clone()
-        };
+        let mask = if redrawn > original { redraw() } else { proposal.pixels.clone() };
         let center = proposal.center;
         let segment = Segment { label, score, pixels: mask, center };
         (!segment.pixels.is_empty()).then_some(Candidate { segment, names })
@@ -282,7 +279,55 @@ pub(crate) fn n_shared(a: &[u32], b: &[u32]) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use chaic_core::rng::RngStream;
+
     use super::*;
+
+    #[test]
+    fn masks_are_redrawn_only_for_likely_proposals_that_use_them() {
+        let proposal = candidate(&[1, 2], 0.0).segment;
+        let mask_of = |p: f32, qualities: [f32; N_QUALITIES]| {
+            let mut is_redrawn = false;
+            let redraw = || {
+                is_redrawn = true;
+                vec![7]
+            };
+            let found = Candidate::new(&proposal, &[1.0 - p, p], qualities, redraw);
+            (found.map(|candidate| candidate.segment.pixels), is_redrawn)
+        };
+        assert_eq!(mask_of(0.5, [0.4, 0.6]), (Some(vec![7]), true));
+        assert_eq!(mask_of(0.5, [0.6, 0.4]), (Some(vec![1, 2]), false));
+        assert_eq!(mask_of(0.01, [0.4, 0.6]), (None, false));
+    }
+
+    #[test]
+    fn stepwise_outputs_are_bit_identical_to_those_of_the_whole_network() {
+        const N: usize = 3;
+        let network = RoiNetwork::new();
+        let parameters = network.network.init_parameters(1);
+        let mut rng = RngStream::new(1, "roi", 0);
+        let inputs = RoiNetwork::input_shapes(N).map(|shape| Tensor {
+            shape,
+            data: (0..shape.len()).map(|_| rng.range(-1.0, 1.0)).collect(),
+        });
+        let [crops, scalars] = &inputs;
+        let mut whole = Pass::new(&network.network, widest());
+        whole.forward_all(&network.network, &parameters, &[crops, scalars]);
+        let stage = SecondStage { network, parameters };
+        let SecondStageInference { mut encoder, mut mask_decoder, .. } = stage.inference();
+        let SecondStage { network, parameters } = &stage;
+        let RoiNetwork { network, labels, qualities, mask } = network;
+        encoder.forward_up_to(network, parameters, &[crops, scalars], *qualities);
+        for node in [*labels, *qualities] {
+            assert!(encoder.activation(node) == whole.activation(node));
+        }
+        let masks = whole.activation(*mask).data.chunks_exact(SIDE * SIDE);
+        assert_eq!(masks.len(), N);
+        for (k, expected) in masks.enumerate().rev() {
+            mask_decoder.forward_map_after(network, parameters, &encoder, *qualities, k);
+            assert!(mask_decoder.activation(*mask).data == expected, "proposal {k}");
+        }
+    }
 
     fn candidate(pixels: &[u32], score: f32) -> Candidate {
         let segment = Segment { label: 3, score, pixels: pixels.to_vec(), center: [0.0; 3] };

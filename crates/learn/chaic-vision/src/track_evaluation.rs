@@ -67,8 +67,11 @@ impl Rate {
 /// Accuracy of tracks over whole episodes, serialized as JSON.
 #[derive(Clone, Debug, Serialize)]
 pub struct TrackReport {
-    /// Number of episodes.
+    /// Number of evaluated episodes.
     pub episodes: usize,
+    /// Episodes that broke down. They are left out of all other fields.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub failures: Vec<EpisodeFailure>,
     /// Number of processed images.
     pub images: usize,
     /// Fraction of detections in an image that show an object of their class.
@@ -91,6 +94,15 @@ pub struct TrackReport {
     pub calibration_error: f64,
     /// Counts by class name.
     pub classes: BTreeMap<&'static str, ClassCounts>,
+}
+
+/// Episode that broke down.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct EpisodeFailure {
+    /// Name of the episode.
+    pub episode: String,
+    /// Cause.
+    pub problem: String,
 }
 
 /// Counts of the objects of one class, over all episodes.
@@ -134,14 +146,35 @@ pub fn evaluate_tracks(
         let mut env = Env::new(config, Some(helper)).expect("the episode is valid");
         let played = env.run(stop, None, &mut |_| -> Result<(), AgentError> { Ok(()) });
         progress();
-        let is_complete = matches!(played, Ok(AdvanceOutcome::Ended));
-        is_complete.then(|| std::mem::take(&mut *lock(&records)))
+        let record = std::mem::take(&mut *lock(&records));
+        evaluated(episode.id(), &played, record)
     };
-    let records = map_in_order(0..n_episodes, n_threads, stop, || (), play)?;
+    let played = map_in_order(0..n_episodes, n_threads, stop, || (), play)?;
     if stop.load(Ordering::Relaxed) {
         return None;
     }
-    Some(TrackReport::new(&records.into_iter().flatten().collect::<Vec<_>>()))
+    let (mut records, mut failures) = (Vec::new(), Vec::new());
+    for result in played {
+        match result {
+            Ok(record) => records.push(record),
+            Err(failure) => failures.push(failure),
+        }
+    }
+    Some(TrackReport { failures, ..TrackReport::new(&records) })
+}
+
+/// Returns the record of an episode that ended, or the reason for which it is left out.
+fn evaluated(
+    episode: &str,
+    played: &Result<AdvanceOutcome, AgentError>,
+    record: EpisodeRecord,
+) -> Result<EpisodeRecord, EpisodeFailure> {
+    let problem = match played {
+        Ok(AdvanceOutcome::Ended) => return Ok(record),
+        Ok(_) => "it did not reach its end".to_owned(),
+        Err(error) => error.to_string(),
+    };
+    Err(EpisodeFailure { episode: episode.to_owned(), problem })
 }
 
 /// Object as it was last seen.
@@ -313,6 +346,7 @@ impl TrackReport {
         records.iter().for_each(|record| record.count_classes(&mut classes));
         TrackReport {
             episodes: records.len(),
+            failures: Vec::new(),
             images: records.iter().map(|r| r.n_images).sum(),
             detection_precision: Rate::new(
                 records.iter().map(|r| [n_correct(r), r.detections.len()]),

@@ -7,6 +7,7 @@
 mod masks;
 mod plan_extent;
 
+use std::cell::OnceCell;
 use std::collections::BTreeMap;
 
 use chaic_agents::perception::{Detection, PixelKind, SegmentMeasurement};
@@ -127,6 +128,28 @@ impl Measurement {
         let total: f32 = self.names.iter().map(|(_, score)| score).sum();
         let named = self.names.iter().filter(|(l, _)| *l == label);
         named.map(|(_, score)| score / total.max(f32::MIN_POSITIVE)).sum()
+    }
+}
+
+/// Detected object in the association of one image.
+struct DetectedObject<'a> {
+    measurement: &'a Measurement,
+    /// True if it is within the reach of a visible person.
+    in_hand: bool,
+    plan_extent: OnceCell<Option<PlanExtent>>,
+}
+
+impl DetectedObject<'_> {
+    /// Returns its extent from above, which is measured once.
+    fn plan_extent(&self) -> Option<PlanExtent> {
+        let measure = || PlanExtent::new(&self.measurement.extent.footprint);
+        *self.plan_extent.get_or_init(measure)
+    }
+
+    /// Returns its extent from above if objects of this label are large.
+    fn large_extent(&self, label: u8) -> Option<PlanExtent> {
+        let is_large = !matches!(pixel_kind(label), PixelKind::Small | PixelKind::Person);
+        is_large.then(|| self.plan_extent()).flatten()
     }
 }
 
@@ -338,16 +361,20 @@ impl Tracker {
         objects: &[usize],
         now: Frame,
     ) -> Vec<Detection> {
-        let is_carried = |k: usize| self.is_near_person(&measurements[k].extent, now);
-        let carried: Vec<bool> = (0..measurements.len()).map(is_carried).collect();
+        let object = |k: &usize| {
+            let measurement = &measurements[*k];
+            let in_hand = self.is_near_person(&measurement.extent, now);
+            DetectedObject { measurement, in_hand, plan_extent: OnceCell::new() }
+        };
+        let objects: Vec<DetectedObject> = objects.iter().map(object).collect();
         let mut pairs: Vec<(f32, usize, usize)> = Vec::new();
         for (t, track) in self.tracks.iter().enumerate() {
             if self.held.contains(&track.id) {
                 continue;
             }
-            for k in objects {
-                let cost = self.cost(track, &measurements[*k], carried[*k], now);
-                pairs.extend(cost.map(|cost| (cost, t, *k)));
+            for (k, object) in objects.iter().enumerate() {
+                let cost = self.cost(track, object, now);
+                pairs.extend(cost.map(|cost| (cost, t, k)));
             }
         }
         pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
@@ -360,15 +387,15 @@ impl Tracker {
             }
         }
         let mut found = Vec::new();
-        for k in objects.iter().copied() {
-            let measurement = &measurements[k];
+        for (k, object) in objects.iter().enumerate() {
+            let measurement = object.measurement;
             let t = match track_of.get(&k) {
                 Some(t) => *t,
-                None if self.is_fragment(measurement, now) => continue,
+                None if self.is_fragment(object, now) => continue,
                 None => self.start_track(measurement, now),
             };
             let (config, track) = (self.config, &mut self.tracks[t]);
-            track.update(measurement, carried[k], now, &config);
+            track.update(object, now, &config);
             let is_reported = track.log_odds > config.report_log_odds;
             if let Some(class) = class_of(track.label).filter(|_| is_reported) {
                 let detection = Detection::new(track.id, class, None, measurement.extent.clone());
@@ -385,56 +412,66 @@ impl Tracker {
     }
 
     /// Cost of a match between a detection and a track; `None` if it is impossible.
-    fn cost(
-        &self,
-        track: &Track,
-        measurement: &Measurement,
-        in_hand: bool,
-        now: Frame,
-    ) -> Option<f32> {
-        let config = &self.config;
+    fn cost(&self, track: &Track, object: &DetectedObject<'_>, now: Frame) -> Option<f32> {
+        let (config, measurement) = (&self.config, object.measurement);
         let distance_m = track.position.distance(measurement.extent.position_in_world);
+        let displacement_m = self.displacement_m(track, object, now);
+        // Most pairs are too far apart to match, whatever their labels.
+        if displacement_m.is_none() && distance_m >= config.max_relabeled_m {
+            return None;
+        }
         let agreement = track.agreement(measurement);
         if agreement < MIN_AGREEMENT {
             let is_same_kind = pixel_kind(track.label) == pixel_kind(measurement.label());
             return (is_same_kind && distance_m < config.max_relabeled_m)
                 .then_some(1.0 + distance_m);
         }
-        let max_static_m = config.max_static_m;
-        let TrackerConfig { carried_m_per_frame, max_carried_m, .. } = *config;
+        // Among the tracks within reach, the one with the smallest displacement and the most similar
+        // labels matches first.
+        let cost = displacement_m? / config.max_static_m;
+        let similarity_cost = DISAGREEMENT_COST * (1.0 - agreement);
+        Some(if track.is_released { cost } else { cost + similarity_cost })
+    }
+
+    /// Displacement of a track if a detection with its label shows it; `None` if it is out of reach.
+    fn displacement_m(
+        &self,
+        track: &Track,
+        object: &DetectedObject<'_>,
+        now: Frame,
+    ) -> Option<f32> {
+        let TrackerConfig { max_static_m, carried_m_per_frame, max_carried_m, .. } = self.config;
+        let position = object.measurement.extent.position_in_world;
         if track.is_released {
             // The object may have fallen.
-            let distance_m =
-                horizontal_distance(track.position, measurement.extent.position_in_world);
-            return (distance_m < config.max_released_m).then_some(distance_m / max_static_m);
+            let distance_m = horizontal_distance(track.position, position);
+            return (distance_m < self.config.max_released_m).then_some(distance_m);
+        }
+        let may_be_carried = track.is_carried || object.in_hand;
+        if !may_be_carried && let Some(extent) = &track.extent {
+            let seen = object.plan_extent()?;
+            let is_same = self.config.is_one_object(track.label, extent, &seen);
+            return is_same.then(|| extent.center().distance(seen.center()));
         }
         let max_walk_m = max_static_m + carried_m_per_frame * (now - track.last_seen) as f32;
-        let may_be_carried = track.is_carried || in_hand;
-        let similarity_cost = DISAGREEMENT_COST * (1.0 - agreement);
-        if !may_be_carried && let Some(extent) = &track.extent {
-            let seen = PlanExtent::new(&measurement.extent.footprint)?;
-            let distance_m = extent.center().distance(seen.center());
-            let is_same = config.is_one_object(track.label, extent, &seen);
-            return is_same.then_some(distance_m / max_static_m + similarity_cost);
-        }
         let max_m = match may_be_carried {
             // A person carries it along.
-            true if track.is_carried && in_hand => max_walk_m,
+            true if track.is_carried && object.in_hand => max_walk_m,
             true => max_walk_m.min(max_carried_m),
             false => max_static_m,
         };
-        // Among the tracks within reach, the one with the smallest displacement and the most similar
-        // labels matches first.
-        (distance_m < max_m).then_some(distance_m / max_static_m + similarity_cost)
+        let distance_m = track.position.distance(position);
+        (distance_m < max_m).then_some(distance_m)
     }
 
     /// True if a detection is a part of an object that was just seen.
-    fn is_fragment(&self, measurement: &Measurement, now: Frame) -> bool {
+    fn is_fragment(&self, object: &DetectedObject<'_>, now: Frame) -> bool {
+        let measurement = object.measurement;
         let label = measurement.label();
         let size_m = extents_m(label).into_iter().fold(0.0, f32::max);
         let near_m = self.config.fragment_extents * size_m;
         let at = measurement.extent.position_in_world;
-        let seen = large_extent(label, measurement);
+        let seen = object.large_extent(label);
         let mut same = self.tracks.iter().filter(|t| t.last_seen == now && t.label == label);
         same.any(|track| match track.extent.as_ref().zip(seen.as_ref()) {
             Some((extent, seen)) => self.config.is_one_object(label, extent, seen),
@@ -481,13 +518,8 @@ impl Track {
         sigmoid(self.log_odds) * self.probability(self.label)
     }
 
-    fn update(
-        &mut self,
-        measurement: &Measurement,
-        is_carried: bool,
-        now: Frame,
-        config: &TrackerConfig,
-    ) {
+    fn update(&mut self, object: &DetectedObject<'_>, now: Frame, config: &TrackerConfig) {
+        let DetectedObject { measurement, in_hand: is_carried, .. } = *object;
         let [low, high] = config.log_odds_range;
         let score = measurement.score();
         self.log_odds = match self.evidence.is_empty() {
@@ -505,7 +537,7 @@ impl Track {
         });
         self.label = strongest.1;
         self.position = measurement.extent.position_in_world;
-        let seen = large_extent(self.label, measurement);
+        let seen = object.large_extent(self.label);
         let has_moved = self.is_carried || self.is_released || is_carried;
         let top_m = measurement.extent.top_m;
         self.top_m = if has_moved { top_m } else { self.top_m.max(top_m) };
@@ -536,12 +568,6 @@ impl TrackerConfig {
         let max_m = max_m.max(a.diameter_m()).max(b.diameter_m());
         a.union(b).diameter_m() < max_m + self.diameter_tolerance_m
     }
-}
-
-/// Extent from above of a detection; `None` for small objects.
-fn large_extent(label: u8, measurement: &Measurement) -> Option<PlanExtent> {
-    let is_large = !matches!(pixel_kind(label), PixelKind::Small | PixelKind::Person);
-    is_large.then(|| PlanExtent::new(&measurement.extent.footprint)).flatten()
 }
 
 /// Diagonal of a class from above, meters.

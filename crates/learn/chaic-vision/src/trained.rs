@@ -4,7 +4,7 @@ use chaic_core::ClassId;
 use chaic_core::geom::Camera;
 use chaic_nn::simd::widest;
 use chaic_nn::weights::WeightsError;
-use chaic_nn::{Inference, Network, Pass, Shape, weights};
+use chaic_nn::{Inference, Network, Shape, weights};
 
 use crate::calibration::{Calibration, N_PREDICTORS, predictors};
 use crate::detector::Detector;
@@ -13,7 +13,7 @@ use crate::instances::{Instance, InstanceConfig, Pixels, remove_background, sort
 use crate::proposals::proposals;
 use crate::roi::RoiSource;
 use crate::roi_network::RoiNetwork;
-use crate::second_stage::SecondStage;
+use crate::second_stage::{SecondStage, SecondStageInference};
 
 /// A trained detector.
 #[derive(Clone, Debug)]
@@ -58,7 +58,7 @@ fn file_layout(detector: &Detector, second_stage: Option<&RoiNetwork>) -> Networ
 #[derive(Clone, Debug)]
 pub struct DetectorInference {
     first_stage: Inference,
-    second_stage: Option<Pass>,
+    second_stage: Option<SecondStageInference>,
 }
 
 impl TrainedDetector {
@@ -138,7 +138,7 @@ impl TrainedDetector {
     /// Creates buffers for inference.
     pub fn inference(&self) -> DetectorInference {
         let first_stage = Inference::new(&self.detector.network, &self.parameters, widest());
-        let second_stage = self.second_stage.as_ref().map(SecondStage::pass);
+        let second_stage = self.second_stage.as_ref().map(SecondStage::inference);
         DetectorInference { first_stage, second_stage }
     }
 
@@ -168,9 +168,9 @@ impl TrainedDetector {
         let DetectorInference { first_stage, second_stage } = inference;
         let pixels = first_stage_pixels(rgb, depth_m, camera, first_stage);
         let mut instances = match (&self.second_stage, second_stage) {
-            (Some(stage), Some(pass)) => {
+            (Some(stage), Some(inference)) => {
                 let source = RoiSource { features: first_stage.last_input(), pixels: &pixels };
-                stage.instances(&source, &proposals(&pixels), depth_m, pass)
+                stage.instances(&source, &proposals(&pixels), depth_m, inference)
             }
             _ => pixels.instances(depth_m, &InstanceConfig::DEFAULT),
         };

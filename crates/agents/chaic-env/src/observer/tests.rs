@@ -103,6 +103,14 @@ fn the_callers_buffers_get_the_same_images() {
 }
 
 #[test]
+fn ids_drawn_on_demand_equal_those_of_an_observation() {
+    let (world, renderer) = world_and_renderer();
+    let granted = observe(&world, &renderer, with_ids(), SENSORS);
+    let ids = renderer.render_ids(&world, ME, SIZE);
+    assert_eq!(Some(ids), granted.observation.images.ids);
+}
+
+#[test]
 fn visible_entities_are_the_objects_and_people_of_the_image_in_order() {
     let object = |k: u16| EntityId(EntityId::FIRST_OBJECT.0 + k);
     let person = EntityId::FIRST_PERSON;

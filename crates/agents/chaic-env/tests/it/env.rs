@@ -6,7 +6,9 @@ use std::sync::{Arc, Mutex};
 
 use chaic_agents::PlannerRules;
 use chaic_core::observation::{FrameHistorySpec, Grants, SensorConfig};
-use chaic_core::{Action, Agent, AgentError, AgentId, Briefing, Observation, TaskId};
+use chaic_core::{
+    Action, Agent, AgentError, AgentId, Briefing, EntityId, Hand, Observation, Target, TaskId,
+};
 use chaic_env::helper_registry::{BuiltInHelpers, Helper, HelperRegistry as _};
 use chaic_env::trace::Record;
 use chaic_env::{
@@ -450,4 +452,45 @@ fn color_drawn_on_demand_equals_that_of_an_observation() {
     let (drawn_again, observed) = image(true);
     assert_eq!(none, None);
     assert!(drawn == drawn_again && Some(drawn) == observed);
+}
+
+#[test]
+fn an_agent_without_images_points_at_what_its_camera_sees() {
+    const SIZE: u32 = 64;
+    let episode = test_episode(TaskId::LowTarget);
+    let start = |grants: Grants, ids: bool| {
+        let sensors = SensorConfig { image_size: SIZE, ids, ..SensorConfig::NONE };
+        let helper = Some(AgentSlot::external(grants, sensors));
+        let mut env = Env::new(config(&episode), EpisodeAgents { helper, partner: None }).unwrap();
+        assert_eq!(env.advance(None), Ok(AdvanceOutcome::NeedsAction));
+        env
+    };
+    let mut with_ids = start(Grants::IDS, true);
+    let observation = with_ids.observe(AgentId::HELPER).expect("the helper waits");
+    let ids = observation.images.ids.clone().expect("ids are granted");
+    let (pixel, id) = (0..).zip(ids).max_by_key(|(_, id)| *id).expect("there are pixels");
+    let (inside, shown) = (Target::Pixel { column: pixel % SIZE, row: pixel / SIZE }, EntityId(id));
+    assert_ne!(shown, EntityId::NOTHING);
+    let resolved = |grants: Grants, object: Target| {
+        let mut env = start(grants, false);
+        assert!(env.submit(AgentId::HELPER, Action::PickUp { object, hand: Hand::Left }));
+        let mut records = Vec::new();
+        run(&mut env, 1, &mut records);
+        let of_helper = |record: &Record| match record {
+            Record::Decision(decision) if decision.agent == AgentId::HELPER => {
+                decision.action.subject()
+            }
+            _ => None,
+        };
+        records.iter().find_map(of_helper).expect("the helper has decided")
+    };
+    assert_eq!(resolved(Grants::NONE, inside), shown);
+    for (column, row) in [(SIZE, 0), (0, SIZE)] {
+        let outside = Target::Pixel { column, row };
+        assert_eq!(resolved(Grants::NONE, outside), EntityId::NOTHING, "{column} {row}");
+    }
+    // Entities can only be named with ids.
+    let entity = Target::Entity(shown);
+    assert_eq!(resolved(Grants::NONE, entity), EntityId::NOTHING);
+    assert_eq!(resolved(Grants::IDS, entity), shown);
 }

@@ -81,6 +81,25 @@ fn an_episode_that_is_stopped_verifies_up_to_its_last_decision() {
 }
 
 #[test]
+fn the_parts_of_a_trace_join_to_the_whole() {
+    let config = config(AgentId::HELPER, InputLevel::Plans, "none");
+    let mut session = LiveSession::start(&episode(), &config, &BuiltInHelpers).unwrap();
+    let (mut joined, mut n_lines, mut n_parts) = (String::new(), 0, 0);
+    for _ in 0..40 {
+        if session.advance(7).unwrap() == LiveStatus::Waiting {
+            choose_first(&mut session);
+        }
+        let added = session.trace_after(n_lines);
+        n_parts += usize::from(!added.is_empty());
+        joined += &added;
+        n_lines = session.n_lines();
+        assert_eq!(session.trace_after(n_lines), "");
+    }
+    assert_eq!(joined, session.trace());
+    assert!(n_parts > 2, "{n_parts}");
+}
+
+#[test]
 fn a_person_who_decides_nothing_stops_the_world() {
     let config = config(AgentId::HELPER, InputLevel::Plans, "none");
     let mut session = LiveSession::start(&episode(), &config, &BuiltInHelpers).unwrap();

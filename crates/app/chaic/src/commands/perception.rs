@@ -10,7 +10,7 @@ use chaic_vision::coco::{ANNOTATIONS, DETECTIONS, annotate, annotations_json, re
 use chaic_vision::evaluate::{DetectionReport, MIN_AREA_PX, MIN_FREQUENT_INSTANCES, report};
 use chaic_vision::instances::Instance;
 use chaic_vision::perception_registry::{read_behavior, read_detector};
-use chaic_vision::track_evaluation::{self, Rate, TrackReport};
+use chaic_vision::track_evaluation::{self, EpisodeFailure, Rate, TrackReport};
 use chaic_vision::trained::TrainedDetector;
 use chaic_vision::views::LabeledView;
 
@@ -19,7 +19,7 @@ use super::{bars, jobs, run_perception, stopped_without_result, write_json};
 use crate::arguments::{BehaviorArguments, ClipArguments, DetectionArguments, TracksArguments};
 use crate::exit::ExitStatus;
 use crate::interrupt;
-use crate::output::{OutputFormat, counted, print_progress, print_result};
+use crate::output::{OutputFormat, counted, print_progress, print_result, print_warning};
 
 /// Evaluates a detector on held-out environments.
 pub fn evaluate_detection(
@@ -100,7 +100,13 @@ pub fn evaluate_tracks(arguments: &TracksArguments, format: OutputFormat) -> Res
     let Some(report) = report else { return Ok(stopped_without_result()) };
     print_result(format, &report, &tracks_text(&report, &arguments.perception))?;
     write_json(arguments.json.as_deref(), &report)?;
-    Ok(ExitStatus::Success)
+    if let Some(EpisodeFailure { episode, problem }) = report.failures.first() {
+        let left_out = counted(report.failures.len(), "episode");
+        print_warning(&format!(
+            "the report leaves out {left_out} that broke down, first {episode}: {problem}"
+        ));
+    }
+    Ok(ExitStatus::from_findings(!report.failures.is_empty()))
 }
 
 fn tracks_text(report: &TrackReport, perception: &str) -> String {

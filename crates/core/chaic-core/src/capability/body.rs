@@ -19,6 +19,7 @@ pub enum Gait {
 
 /// Physical limits and dimensions of a body. All heights are above the ground.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct Capability {
     /// Lowest and highest top of an object for a pick-up without a chance of failure, meters (paper
     /// section 3.1; facts S1.1).
@@ -203,6 +204,17 @@ impl LimitPenalty {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn unknown_fields_are_refused() {
+        let capability = crate::capability::Persona::Adult.capability();
+        let mut json = serde_json::to_value(capability).unwrap();
+        assert_eq!(serde_json::from_value::<Capability>(json.clone()).unwrap(), capability);
+        // A misspelled optional field.
+        json["lift_furniture"] = false.into();
+        let error = serde_json::from_value::<Capability>(json).unwrap_err().to_string();
+        assert!(error.contains("unknown field `lift_furniture`"), "{error}");
+    }
 
     #[test]
     fn fatigue_grows_by_work_and_falls_by_rest() {

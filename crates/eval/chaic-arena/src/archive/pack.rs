@@ -3,10 +3,7 @@
 use std::io::{self, BufWriter, Read as _, Write};
 use std::path::Path;
 
-use chaic_files::{
-    Entry, EntryKind, FileError, LOCK, TEMPORARY_SUFFIX, create_or_replace, open_file, remove_file,
-    rename, walk, with_suffix,
-};
+use chaic_files::{Entry, EntryKind, FileError, LOCK, TemporaryFile, open_file, walk};
 use sha2::{Digest as _, Sha256};
 use tar::{EntryType, Header};
 
@@ -42,22 +39,13 @@ pub fn pack(folder: &Path, archive: &Path) -> Result<PackedArchive> {
         let problem = format!("its archive {archive} would lie inside; choose another place");
         return Err(refused(folder, problem));
     }
-    let temporary = with_suffix(archive, TEMPORARY_SUFFIX);
-    let file = create_or_replace(&temporary).map_err(FileError::context("create", &temporary))?;
+    let file = TemporaryFile::beside(archive).map_err(FileError::context("create", archive))?;
     let mut output = Hashed::new(BufWriter::new(file));
-    let packed = write_archive(folder, &mut output).and_then(|n_files| {
-        let Hashed { inner, digest, bytes } = output;
-        let file = inner.into_inner().map_err(io::IntoInnerError::into_error);
-        let synced = file.and_then(|file| file.sync_all());
-        synced.map_err(FileError::context("write", &temporary))?;
-        rename(&temporary, archive)?;
-        Ok(PackedArchive { n_files, bytes, sha256: to_hex(&digest.finalize()) })
-    });
-    if packed.is_err() {
-        // If the removal fails too, the suffix marks the file as temporary.
-        let _ = remove_file(&temporary);
-    }
-    packed
+    let n_files = write_archive(folder, &mut output)?;
+    let Hashed { inner, digest, bytes } = output;
+    let file = inner.into_inner().map_err(io::IntoInnerError::into_error);
+    file.and_then(TemporaryFile::commit).map_err(FileError::context("write", archive))?;
+    Ok(PackedArchive { n_files, bytes, sha256: to_hex(&digest.finalize()) })
 }
 
 /// Returns the SHA-256 of the archive that [`pack`] writes of a folder.

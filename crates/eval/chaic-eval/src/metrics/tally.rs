@@ -155,7 +155,61 @@ pub fn tally(trace: &Trace) -> Option<RunResult> {
 
 #[cfg(test)]
 mod tests {
+    use chaic_env::{Digest, EpisodeConfig, trace_header};
+    use chaic_episodes::find_episode;
+
     use super::*;
+
+    /// Returns the header of an episode without helper and child.
+    fn header() -> Header {
+        let episode = find_episode("low_target/test/01").unwrap();
+        trace_header(EpisodeConfig::new(&episode, "none"), None).unwrap()
+    }
+
+    fn end() -> End {
+        let (frame, digest) = (90, Digest(1));
+        let (away_frames, stuck_frames) = (7, 5);
+        End { frame, done: 1.0, total: 3.0, complete: false, away_frames, stuck_frames, digest }
+    }
+
+    #[test]
+    fn deliveries_name_the_work_of_the_helper() {
+        let (partner, helper, child) = (AgentId::PARTNER, AgentId::HELPER, AgentId::CHILD);
+        let object = EntityId(40);
+        let taken = |agent| EventKind::Taken { agent, object };
+        let lifted = |leader, follower| EventKind::LiftedTogether { leader, follower, object };
+        // Whether the object was carried together, and whether the helper has held it.
+        for (events, expected) in [
+            (vec![taken(partner)], (false, false)),
+            (vec![taken(helper), taken(partner)], (false, true)),
+            (vec![lifted(partner, helper)], (true, true)),
+            (vec![lifted(helper, partner)], (true, true)),
+            (vec![lifted(partner, child)], (false, false)),
+            (vec![lifted(partner, helper), taken(partner)], (false, true)),
+        ] {
+            let mut tally = Tally::new(&header());
+            let delivered = EventKind::Delivered { object, by: partner, counted: true };
+            events.iter().for_each(|kind| tally.add_event(kind, 20, None));
+            tally.add_event(&delivered, 30, Some(ClassId::named("apple")));
+            let [delivery] = &tally.deliveries[..] else { panic!("{:?}", tally.deliveries) };
+            assert_eq!((delivery.together, delivery.handed), expected, "{events:?}");
+            assert_eq!((delivery.frame, delivery.by, delivery.counted), (30, partner, true));
+        }
+    }
+
+    #[test]
+    fn only_episodes_with_a_child_have_frames_of_its_absence() {
+        let alone = header();
+        let mut with_child = alone.clone();
+        with_child.people.push(alone.people[0].clone());
+        with_child.people[1].agent = AgentId::CHILD;
+        for (header, away, escape) in [(alone, None, None), (with_child, Some(7), Some(0))] {
+            let result = Tally::new(&header).add(&Record::End(end())).unwrap();
+            let summary = result.summary().unwrap();
+            assert_eq!((summary.away_frames, summary.escape_frames), (away, escape));
+            assert_eq!((summary.frames, summary.stuck_frames), (90, Some(5)));
+        }
+    }
 
     #[test]
     fn escapes_are_counted_between_the_childs_decisions_and_to_the_end() {

@@ -257,6 +257,16 @@ impl RunFolder {
                 )));
             }
         }
+        for (name, perception) in &recorded.perception {
+            let other = granted.perception.get(name).filter(|other| *other != perception);
+            if let Some(other) = other {
+                return Err(EvalError::Options(format!(
+                    "the perception of {name} is `{other}` now, but {} has `{perception}`; give the same \
+                     files or start a new run",
+                    path.display()
+                )));
+            }
+        }
         if let Some(name) = recorded.weights.iter().find_map(|(name, digest)| {
             granted.weights.get(name).filter(|other| *other != digest).map(|_| name)
         }) {

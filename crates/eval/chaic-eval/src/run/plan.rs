@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use chaic_core::task::Origin;
 use chaic_core::{Frame, TaskId};
 use chaic_env::{Digest, RunKey, slug};
-use chaic_episodes::{Episode, Split, find_episode};
+use chaic_episodes::{Episode, Split, SplitError, find_episode};
 use chaic_files::{create_folders_below, write_atomically};
+use rayon::prelude::*;
 
 use crate::episode_file::{
     episode_files, parse_episode_files, read_episode_file, read_episode_files,
@@ -76,15 +77,33 @@ pub(super) fn plan(options: &RunOptions, files: &[Episode]) -> Result<Vec<Episod
     Ok(jobs)
 }
 
-/// Checks that the first episode of each task can be played with the requested partner.
+/// Maximum number of episodes per task that [`check_partner`] generates; more would delay the start
+/// of the run. It exceeds the size of all splits with a fixed size.
+const MAX_CHECKED_PER_TASK: usize = 200;
+
+/// Checks that the episodes can be played with the requested partner: a person may need a bicycle, or
+/// not fit at the start. Later episodes of a task with more than [`MAX_CHECKED_PER_TASK`] are checked
+/// when they are played.
 ///
-/// It finds what all episodes of a task share, such as a house without a bicycle. A person that does not
-/// fit at the start of a later episode is found when that episode is played: generating all episodes of a
-/// large split would delay the start.
+/// # Errors
+/// One line with the number of unplayable episodes and the problem of the first one.
 pub(super) fn check_partner(jobs: &[EpisodeJob]) -> Result<()> {
-    let mut tasks = BTreeSet::new();
-    let mut first_jobs = jobs.iter().filter(|job| tasks.insert(job.key.task));
-    first_jobs.try_for_each(|job| Ok(find_episode(&job.key.episode).map(|_| ())?))
+    let mut by_task: BTreeMap<TaskId, Vec<&str>> = BTreeMap::new();
+    for RunKey { task, episode, .. } in jobs.iter().map(|job| &job.key) {
+        let ids = by_task.entry(*task).or_default();
+        // The runs of one episode are consecutive.
+        if ids.len() < MAX_CHECKED_PER_TASK && ids.last() != Some(&episode.as_str()) {
+            ids.push(episode);
+        }
+    }
+    let ids: Vec<&str> = by_task.into_values().flatten().collect();
+    let problems: Vec<SplitError> =
+        ids.par_iter().filter_map(|id| find_episode(id).err()).collect();
+    let Some(first) = problems.first() else { return Ok(()) };
+    let (n, n_checked) = (problems.len(), ids.len());
+    Err(EvalError::Options(format!(
+        "{n} of {n_checked} episodes can't be played with this partner, first {first}"
+    )))
 }
 
 /// Checks that the partner has a recording of every planned episode. `playable` has the digests of the
@@ -299,6 +318,23 @@ mod tests {
             EpisodeJob { key, horizon: 100, environment: environment(episode) }
         };
         episodes.iter().map(job).collect()
+    }
+
+    #[test]
+    fn all_planned_episodes_are_checked_with_the_partner() {
+        let job = |k: u32, person: &str| {
+            let (task, helper) = (TaskId::HighTarget, "rhp".to_owned());
+            let episode = format!("{task}/test/{k:02}/{person}");
+            let key = RunKey { task, helper, episode, seed: 0 };
+            EpisodeJob { key, horizon: 100, environment: String::new() }
+        };
+        check_partner(&[job(0, "child"), job(1, "child")]).unwrap();
+        // Houses have no bicycle.
+        let jobs = [job(0, "child"), job(1, "child"), job(2, "rider"), job(2, "rider")];
+        let error = check_partner(&jobs).unwrap_err();
+        let text = error.to_string();
+        assert!(error.is_usage() && text.starts_with("1 of 3 episodes"), "{text}");
+        assert!(text.contains("first high_target/test/02/rider") && text.contains("0 bicycles"));
     }
 
     #[test]

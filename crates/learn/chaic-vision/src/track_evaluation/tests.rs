@@ -4,7 +4,7 @@
 use super::*;
 use crate::noisy::{DetectorNoiseModel, NoisyPerceptionFactory};
 
-fn evaluated(noise: DetectorNoiseModel) -> TrackReport {
+fn report_of(noise: DetectorNoiseModel) -> TrackReport {
     let perception = NoisyPerceptionFactory::new(noise, "noisy".to_owned());
     let stop = AtomicBool::new(false);
     evaluate_tracks(&perception, DatasetSplit::Validation, 2, 2, &|| (), &stop).expect("no stop")
@@ -12,12 +12,12 @@ fn evaluated(noise: DetectorNoiseModel) -> TrackReport {
 
 #[test]
 fn perfect_detections_are_remembered_and_errors_lower_the_scores() {
-    let perfect = evaluated(DetectorNoiseModel::none());
-    assert_eq!(perfect.episodes, 2);
+    let perfect = report_of(DetectorNoiseModel::none());
+    assert!(perfect.episodes == 2 && perfect.failures.is_empty(), "{perfect:?}");
     assert!(perfect.detection_precision.value > 0.99, "{perfect:?}");
     assert!(perfect.detection_recall.value > 0.95, "{perfect:?}");
     assert!(perfect.memory_recall.value > 0.9, "{perfect:?}");
-    let noisy = evaluated(DetectorNoiseModel {
+    let noisy = report_of(DetectorNoiseModel {
         misclassification_rate: 0.3,
         false_positives_per_image: 0.2,
         ..DetectorNoiseModel::none()
@@ -25,6 +25,16 @@ fn perfect_detections_are_remembered_and_errors_lower_the_scores() {
     assert!(noisy.detection_precision.value < perfect.detection_precision.value, "{noisy:?}");
     assert!(noisy.memory_precision.value < perfect.memory_precision.value, "{noisy:?}");
     assert!(noisy.identity_switches.value > perfect.identity_switches.value, "{noisy:?}");
+}
+
+#[test]
+fn an_episode_that_broke_down_is_a_failure() {
+    let result = |played| evaluated("obstacle/gen-standard/1", &played, EpisodeRecord::default());
+    assert!(result(Ok(AdvanceOutcome::Ended)).is_ok());
+    let failure = result(Err(AgentError::Broken("no image".to_owned()))).unwrap_err();
+    assert_eq!(failure.episode, "obstacle/gen-standard/1");
+    assert!(failure.problem.contains("no image"), "{failure:?}");
+    assert!(result(Ok(AdvanceOutcome::Stopped)).is_err());
 }
 
 #[test]

@@ -6,6 +6,7 @@ use chaic_agents::track::Carried;
 use chaic_core::Hand;
 use chaic_core::briefing::{Companion, CompanionRole};
 use chaic_core::geom::yaw_rotation;
+use chaic_core::rng::RngStream;
 
 use super::*;
 use crate::labels::label_of;
@@ -185,6 +186,82 @@ fn large_objects_keep_their_track_in_all_views_and_touching_ones_have_two() {
     let neighbor = seen(corner + Vec2::new(x, 0.0), corner + Vec2::new(2.0 * x, 0.0));
     let both = tracks(&observer.observe(&[neighbor, front]));
     assert!(both.len() == 2 && both.contains(&first[0]), "{both:?}");
+}
+
+fn object(measurement: &Measurement, in_hand: bool) -> DetectedObject<'_> {
+    DetectedObject { measurement, in_hand, plan_extent: OnceCell::new() }
+}
+
+/// Cost of a match that compares labels first, whatever the distance.
+fn reference_cost(
+    tracker: &Tracker,
+    track: &Track,
+    object: &DetectedObject<'_>,
+    now: Frame,
+) -> Option<f32> {
+    let (config, measurement) = (&tracker.config, object.measurement);
+    let position = measurement.extent.position_in_world;
+    let distance_m = track.position.distance(position);
+    let agreement = track.agreement(measurement);
+    if agreement < MIN_AGREEMENT {
+        let is_same_kind = pixel_kind(track.label) == pixel_kind(measurement.label());
+        return (is_same_kind && distance_m < config.max_relabeled_m).then_some(1.0 + distance_m);
+    }
+    if track.is_released {
+        let distance_m = horizontal_distance(track.position, position);
+        return (distance_m < config.max_released_m).then_some(distance_m / config.max_static_m);
+    }
+    let similarity_cost = DISAGREEMENT_COST * (1.0 - agreement);
+    let may_be_carried = track.is_carried || object.in_hand;
+    if !may_be_carried && let Some(extent) = &track.extent {
+        let seen = PlanExtent::new(&measurement.extent.footprint)?;
+        let distance_m = extent.center().distance(seen.center());
+        let is_same = config.is_one_object(track.label, extent, &seen);
+        return is_same.then_some(distance_m / config.max_static_m + similarity_cost);
+    }
+    let n_frames = (now - track.last_seen) as f32;
+    let max_walk_m = config.max_static_m + config.carried_m_per_frame * n_frames;
+    let max_m = match may_be_carried {
+        true if track.is_carried && object.in_hand => max_walk_m,
+        true => max_walk_m.min(config.max_carried_m),
+        false => config.max_static_m,
+    };
+    (distance_m < max_m).then_some(distance_m / config.max_static_m + similarity_cost)
+}
+
+#[test]
+fn costs_are_bit_identical_to_those_that_compare_the_labels_of_all_pairs() {
+    let draw = |rng: &mut RngStream| {
+        let class = ["apple", "orange", "refrigerator", "trashbin"][rng.below(4)];
+        let reach_m = [0.1, 0.5, 3.0][rng.below(3)];
+        let at = [(); 3].map(|()| rng.range(-reach_m, reach_m));
+        let mut drawn = measurement(class, rng.range(0.3, 0.9), at);
+        if rng.chance(0.3) {
+            drawn.names.push((label("banana"), 0.1));
+        }
+        let n_points = rng.below(9);
+        let mut point = || Vec2::new(at[0] + rng.range(-0.4, 0.4), at[2] + rng.range(-0.4, 0.4));
+        drawn.extent.footprint = (0..n_points).map(|_| point()).collect();
+        drawn
+    };
+    let mut rng = RngStream::new(1, "pairs", 0);
+    let mut n_possible = 0;
+    for _ in 0..3000 {
+        let [first, second] = [(); 2].map(|()| draw(&mut rng));
+        let [was_in_hand, in_hand, is_released] = [0.3, 0.3, 0.2].map(|p| rng.chance(p));
+        let mut tracker = Tracker::default();
+        tracker.start_track(&first, 0);
+        let (config, now) = (tracker.config, 30);
+        let track = &mut tracker.tracks[0];
+        track.update(&object(&first, was_in_hand), 0, &config);
+        track.is_released = is_released;
+        let (track, second) = (&tracker.tracks[0], object(&second, in_hand));
+        let [cost, expected] =
+            [tracker.cost(track, &second, now), reference_cost(&tracker, track, &second, now)];
+        assert_eq!(cost.map(f32::to_bits), expected.map(f32::to_bits), "{track:?}");
+        n_possible += usize::from(cost.is_some());
+    }
+    assert!((100..2900).contains(&n_possible), "{n_possible}");
 }
 
 #[test]

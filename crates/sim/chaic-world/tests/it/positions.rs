@@ -2,10 +2,13 @@
 
 use crate::common::*;
 use chaic_core::action::{Action, FailureReason, Hand, Outcome};
-use chaic_core::capability::Persona;
+use chaic_core::capability::{PersonKind, Persona};
 use chaic_core::geom::{Pose, forward};
 use chaic_core::{EntityId, ResolvedAction, Vec2, Vec3};
-use chaic_world::{ObjectLocation, Opening, Room, RoomKind, Snapshot, World, top_surfaces};
+use chaic_world::{
+    ActionStep, Activity, AgentSpec, ObjectLocation, Opening, Phase, Room, RoomKind, Snapshot,
+    World, top_surfaces,
+};
 
 fn pick(object: EntityId) -> ResolvedAction {
     Action::PickUp { object, hand: Hand::Right }
@@ -194,5 +197,98 @@ fn a_removed_obstacle_covers_no_small_object() {
     for k in 1..=n_apples {
         let apart_m = in_plan(position(&w, nth(0)), position(&w, nth(k)));
         assert!(apart_m > radius, "apple {k} at {}", position(&w, nth(k)));
+    }
+}
+
+/// Returns the positions of agent A's left and right hand in its body frame.
+fn hands_in_body(w: &World) -> [Vec3; 2] {
+    w.posture(A).arms.map(|arm| arm.hand_in_body)
+}
+
+#[test]
+fn hands_hang_beside_the_body_and_hold_objects_in_front_of_it() {
+    let h = Persona::Adult.capability().height_m;
+    let (empty, holding) = (at(0.24, 0.43 * h, 0.0), at(0.2, 0.57 * h, -0.31 * h));
+    let in_sling = at(0.0, 0.66 * h, -0.12 * h);
+    // The left hand, the right hand, and the right hand with an object.
+    for (name, expected) in [
+        ("adult", [at(-0.24, 0.43 * h, 0.0), empty, holding]),
+        ("adult+one_handed", [in_sling, empty, holding]),
+        ("rider", [at(-0.4, 0.98, -0.35), empty, holding]),
+        ("wheelchair", [at(-0.33, 0.62, 0.0), at(0.33, 0.62, 0.0), at(0.18, 0.82, -0.5)]),
+    ] {
+        let kind: PersonKind = name.parse().expect("a valid kind");
+        let pose = Pose { position: at(1.0, 0.0, 2.0), yaw_rad: 0.7 };
+        let mut things = vec![thing("apple", at(3.0, 0.0, 0.0))];
+        things.extend((name == "rider").then(|| thing("bike", at(1.5, 0.0, 2.0))));
+        let mut w = world(hall(things, vec![AgentSpec::new(kind, pose, 0)]));
+        let [left, right] = hands_in_body(&w);
+        let mut state = w.state().clone();
+        state.agents[0].hands[Hand::Right.index()] = Some(nth(0));
+        state.objects[1].location = ObjectLocation::Held { by: A, hand: Hand::Right };
+        restore(&mut w, &state);
+        w.tick();
+        let found = [left, right, hands_in_body(&w)[Hand::Right.index()]];
+        for (found, expected) in found.into_iter().zip(expected) {
+            assert!(found.distance(expected) < 1e-4, "{name}: {found} instead of {expected}");
+        }
+        let hangs_at = pose.to_world(expected[2]) - Vec3::Y * (0.5 * size(&w, nth(0)).y);
+        assert!(position(&w, nth(0)).distance(hangs_at) < 1e-4, "{name}: {hangs_at}");
+    }
+}
+
+/// Replaces the current step of agent A; its duration is 16 frames.
+fn set_step(w: &mut World, phase: Phase, elapsed: u32) {
+    let step = ActionStep { phase, elapsed, frames: 16 };
+    let (action, queue) = (Action::PutIn, Vec::new());
+    let mut state = w.state().clone();
+    state.agents[0].activity = Some(Activity { action, since: 0, step, queue, failing: None });
+    restore(w, &state);
+}
+
+#[test]
+fn hands_follow_the_steps_of_an_action() {
+    let apple = thing("apple", at(0.5, 0.0, -0.5));
+    let mut w = world(hall(vec![apple], vec![person(Persona::Adult, 0.0, 0.0)]));
+    // The body frame is the world frame.
+    let ([left, right], to) = (hands_in_body(&w), at(0.4, 1.0, -0.6));
+    let half_height = Vec3::Y * (0.5 * size(&w, nth(0)).y);
+    let grasped = position(&w, nth(0)) + half_height;
+    let smooth = |t: f32| t * t * (3.0 - 2.0 * t);
+    let (hand, object) = (Some(Hand::Right), nth(0));
+    let reach = |hand, fails| Phase::Reach { hand, to, fails };
+    let release = Phase::Release { hand, object, on: None, at: to, set_down: true };
+    for (phase, elapsed, expected) in [
+        (reach(hand, false), 4, [left, right.lerp(to, smooth(0.25))]),
+        // A failed reach is faster.
+        (reach(hand, true), 4, [left, right.lerp(to, smooth(0.375))]),
+        (reach(hand, true), 12, [left, to]),
+        (reach(Some(Hand::Left), false), 16, [to, right]),
+        (reach(None, false), 16, [to - Vec3::X * 0.22, to + Vec3::X * 0.22]),
+        (Phase::Grasp { hand, object }, 1, [left, grasped]),
+        (release, 1, [left, to + half_height]),
+        (Phase::ResetArms { from: Some(to), hand }, 4, [left, to.lerp(right, 0.25)]),
+        (Phase::Stand, 4, [left, right]),
+    ] {
+        set_step(&mut w, phase, elapsed);
+        for (found, expected) in hands_in_body(&w).into_iter().zip(expected) {
+            let distance = found.distance(expected);
+            assert!(distance < 1e-4, "{phase:?}: {found} instead of {expected}");
+        }
+    }
+}
+
+#[test]
+fn people_bend_to_low_hands_and_stretch_to_high_ones() {
+    let mut w = world(hall(vec![], vec![person(Persona::Adult, 0.0, 0.0)]));
+    let height_m = Persona::Adult.capability().height_m;
+    for (fraction, bend, stretch) in
+        [(-0.1, 1.0, 0.0), (0.2, 0.5, 0.0), (0.7, 0.0, 0.0), (1.2, 0.0, 0.4), (2.0, 0.0, 1.0)]
+    {
+        let to = at(0.3, fraction * height_m, -0.5);
+        set_step(&mut w, Phase::Reach { hand: Some(Hand::Right), to, fails: false }, 16);
+        let posture = w.posture(A);
+        let differs = (posture.bend - bend).abs().max((posture.stretch - stretch).abs());
+        assert!(differs < 1e-4, "{fraction}: {} {}", posture.bend, posture.stretch);
     }
 }

@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use chaic_core::AgentId;
-use chaic_env::trace::{Header, Record, Trace};
+use chaic_env::Track;
+use chaic_env::helper_registry::BuiltInHelpers;
+use chaic_env::trace::{Decision, Header, Participant, Record, Trace};
 
 use super::*;
 
@@ -67,9 +69,9 @@ fn verification_finds_changes() {
         } else {
             fs::write(&path, changed).unwrap();
         }
-        let mismatches = report().mismatches;
-        assert_eq!(mismatches.len(), 1, "{from}");
-        let mismatch = mismatches[0].to_string();
+        let found = report();
+        assert_eq!((found.mismatches.len(), found.findings), (1, vec![]), "{from}");
+        let mismatch = found.mismatches[0].to_string();
         assert!(mismatch.contains(message) && mismatch.contains("short-0-s0.jsonl"), "{mismatch}");
         fs::write(&path, &text).unwrap();
     }
@@ -261,4 +263,235 @@ fn an_episode_that_was_stopped_verifies_wherever_its_trace_stops() {
     let (cut, _) = text.trim_end().rsplit_once('\n').unwrap();
     fs::write(&path, format!("{cut}\n")).unwrap();
     assert!(verified(&run, &helpers)[0].contains("differs from the one of the trace"));
+}
+
+#[test]
+fn a_run_of_another_version_and_older_forms_of_traces_verify() {
+    let helpers = TestHelpers::new();
+    let (run, path, dir) = played_once(&helpers);
+    let run_file = dir.path().join("run.json");
+    let text = fs::read_to_string(&run_file).unwrap();
+    fs::write(&run_file, text.replacen(chaic_env::CHAIC_VERSION, "0.0.9", 1)).unwrap();
+    let (mut trace, _) = crate::trace_file::read(&path).unwrap();
+    trace.header.chaic = "0.0.9".to_owned();
+    for version in chaic_env::trace::MIN_VERSION..=chaic_env::trace::VERSION {
+        trace.header.version = version;
+        let text: String = trace.lines().map(|line| line + "\n").collect();
+        fs::write(&path, text).unwrap();
+        assert_eq!(verified(&run, &helpers), [""; 0], "version {version}");
+    }
+}
+
+/// Agent that waits, and has trained weights.
+struct TrainedAgent {
+    weights: &'static str,
+    isolation: Option<&'static str>,
+}
+
+impl Agent for TrainedAgent {
+    fn sensors(&self) -> SensorConfig {
+        SensorConfig::NONE
+    }
+
+    fn reset(&mut self, _: &Briefing) {}
+
+    fn act(&mut self, _: &Observation) -> std::result::Result<Action, AgentError> {
+        Ok(Action::Wait { frames: 10 })
+    }
+
+    fn perception(&self) -> Option<String> {
+        Some(format!("learned {}", self.weights))
+    }
+
+    fn isolation(&self) -> Option<String> {
+        self.isolation.map(str::to_owned)
+    }
+
+    fn weights(&self) -> Option<String> {
+        Some(self.weights.to_owned())
+    }
+}
+
+/// Registry of a helper and a partner with trained weights of this digest.
+struct TrainedAgents(&'static str);
+
+impl TrainedAgents {
+    fn create(&self, name: &str, isolation: Option<&'static str>) -> Option<Helper> {
+        let agent = Box::new(TrainedAgent { weights: self.0, isolation });
+        (name == "trained").then(|| Helper { agent, grants: Grants::NONE })
+    }
+}
+
+impl HelperRegistry for TrainedAgents {
+    fn names(&self) -> Vec<String> {
+        vec!["trained".to_owned()]
+    }
+
+    fn make(&self, name: &str, _: PlannerRules) -> Option<Helper> {
+        self.create(name, Some("sandbox"))
+    }
+
+    fn partner(&self, name: &str, _: Option<&RunKey>, _: PlannerRules) -> Option<Helper> {
+        self.create(name, None)
+    }
+}
+
+#[test]
+fn weights_perception_and_isolation_in_traces_are_those_of_the_run() {
+    fn other() -> Option<String> {
+        Some("other".to_owned())
+    }
+    let (then, now) = (TrainedAgents("0123456789abcdef"), TrainedAgents("fedcba9876543210"));
+    let (files, dir) = (episode_files(&[TaskId::LowTarget], 1), tempfile::tempdir().unwrap());
+    let partner = Some("trained".to_owned());
+    let request = RunRequest { seeds: None, partner, ..request(&files, &["trained"]) };
+    let (mut run, _) = Run::open(dir.path(), FolderMode::New, &request, &then).unwrap();
+    assert!(run.play(1, &then, &AtomicBool::new(false), &mut |_| ()).unwrap());
+    let path = run.folder().traces().unwrap().remove(0);
+    let (trace, _) = crate::trace_file::read(&path).unwrap();
+    let people = "differs from the one that this run writes: people";
+    let perception = "run.json names another perception of the helper";
+    // Problems with agents whose weights have changed since, and with unknown agents.
+    let changes: [(AgentId, fn(&mut Participant), [&str; 2]); 9] = [
+        (AgentId::PARTNER, |_| (), ["", ""]),
+        // `run.json` has no weights of partners.
+        (AgentId::PARTNER, |p| p.weights = other(), ["", ""]),
+        (AgentId::PARTNER, |p| p.weights = None, [people, ""]),
+        (AgentId::PARTNER, |p| p.grants.goal = true, [people, people]),
+        (AgentId::HELPER, |p| p.weights = other(), [people, people]),
+        (AgentId::HELPER, |p| p.weights = None, [people, people]),
+        (AgentId::HELPER, |p| p.isolation = other(), [people, people]),
+        (AgentId::HELPER, |p| p.perception = other(), [perception, perception]),
+        (AgentId::HELPER, |p| p.grants.goal = true, [people, people]),
+    ];
+    let registries: [&dyn HelperRegistry; 2] = [&now, &BuiltInHelpers];
+    for (k, (agent, change, expected)) in changes.into_iter().enumerate() {
+        let mut changed = trace.clone();
+        change(&mut changed.header.people[agent.index()]);
+        for (helpers, expected) in registries.into_iter().zip(expected) {
+            let (folder, options) = (run.folder(), run.options());
+            let found = crate::verify::verify_trace(folder, options, helpers, &changed, &path);
+            let problem = found.unwrap().map_or(String::new(), |mismatch| mismatch.problem);
+            let is_expected =
+                problem.contains(expected) && problem.is_empty() == expected.is_empty();
+            assert!(is_expected, "change {k}: {problem:?} instead of {expected:?}");
+        }
+    }
+}
+
+#[test]
+fn the_track_limits_the_grants_of_helpers_in_traces() {
+    let helpers = TestHelpers::new();
+    let (run, path, _dir) = played_once(&helpers);
+    let (mut trace, _) = crate::trace_file::read(&path).unwrap();
+    let problem = |trace: &Trace, track| {
+        let options = RunOptions { track, ..run.options().clone() };
+        let found =
+            crate::verify::verify_trace(run.folder(), &options, &helpers, trace, &path).unwrap();
+        found.map(|mismatch| mismatch.problem)
+    };
+    assert!(trace.header.people[AgentId::PARTNER.index()].grants.goal, "partners are no helpers");
+    assert_eq!(problem(&trace, Track::Hidden), None);
+    trace.header.people[AgentId::HELPER.index()].grants.goal = true;
+    let refused = problem(&trace, Track::Hidden).unwrap();
+    let message = "helper `turner` is granted goal, which the hidden track refuses";
+    assert!(refused.contains(message), "{refused}");
+    let differs = problem(&trace, Track::Unrestricted).unwrap();
+    assert!(differs.ends_with("differs from the one that this run writes: people"), "{differs}");
+}
+
+#[test]
+fn the_first_differing_or_additional_record_is_named() {
+    let helpers = TestHelpers::new();
+    let (run, path, _dir) = played_once(&helpers);
+    let (trace, _) = crate::trace_file::read(&path).unwrap();
+    let episode = run.folder().episode(run.options(), &trace.header.key()).unwrap();
+    let decisions: Vec<(usize, &Decision)> = (0..)
+        .zip(&trace.records)
+        .filter_map(|(k, record)| match record {
+            Record::Decision(decision) => Some((k, decision)),
+            _ => None,
+        })
+        .collect();
+    let of_helper: Vec<usize> =
+        (0..decisions.len()).filter(|n| decisions[*n].1.agent == AgentId::HELPER).collect();
+    let ((first, _), (second, decision)) = (decisions[of_helper[0]], decisions[of_helper[1]]);
+    let before = decisions[of_helper[1] - 1].1;
+    let check = |records: Vec<Record>, frame: u32, agent: Option<AgentId>, problem: &str| {
+        let changed = Trace { records, ..trace.clone() };
+        let found = crate::verify::verify(&changed, &episode, &path).unwrap().expect(problem);
+        assert_eq!((found.frame, found.agent, found.problem.as_str()), (frame, agent, problem));
+    };
+    let changed = |k: usize, change: &dyn Fn(&mut Decision)| {
+        let mut records = trace.records.clone();
+        if let Record::Decision(decision) = &mut records[k] {
+            change(decision);
+        }
+        records
+    };
+    let helper = Some(AgentId::HELPER);
+
+    let action = serde_json::to_string(&before.action).unwrap();
+    let problem = format!(
+        "the state's digest is {} in the trace, {} in the re-simulation; the decision before it is \
+         the {}'s {action} at frame {}",
+        Digest(1),
+        decision.digest,
+        before.agent,
+        before.frame
+    );
+    let records = changed(second, &|decision| decision.digest = Digest(1));
+    check(records.clone(), decision.frame, helper, &problem);
+    // A trace that stops there.
+    check(records[..=second].to_vec(), decision.frame, helper, &problem);
+
+    let problem = "the trace has a decision at frame 1, but another agent decides next";
+    check(changed(first, &|decision| decision.frame = 1), 0, helper, problem);
+
+    let with = |record: &Record| [trace.records.as_slice(), std::slice::from_ref(record)].concat();
+    let problem =
+        format!("the trace has a decision at frame {}, but the episode is over", decision.frame);
+    check(with(&trace.records[second]), HORIZON, helper, &problem);
+    let event = trace.records.iter().find(|r| matches!(r, Record::Event(_))).unwrap();
+    let problem = format!("the trace continues with {}", event.to_line());
+    check(with(event), HORIZON, None, &problem);
+}
+
+#[test]
+fn counters_belong_to_agents_that_are_not_built_in() {
+    let helpers = TestHelpers::new();
+    let runs: [(Option<&str>, &[&str]); 2] =
+        [(None, &["helper.calls"]), (Some("slow"), &["helper.calls", "partner.calls"])];
+    for (partner, allowed) in runs {
+        let (run, _, _dir) = played_with(&helpers, partner);
+        let journal = run.folder().results();
+        let line = fs::read_to_string(&journal).unwrap();
+        for name in ["helper.calls", "partner.calls", "child.calls"] {
+            let counts = format!("\"counts\":{{\"{name}\":1}},\"digest\"");
+            fs::write(&journal, line.replacen("\"digest\"", &counts, 1)).unwrap();
+            let problems = verified(&run, &helpers);
+            assert_eq!(problems.is_empty(), allowed.contains(&name), "{name}: {problems:?}");
+            let message = format!("has the count {name}, but");
+            assert!(problems.iter().all(|problem| problem.contains(&message)), "{problems:?}");
+        }
+    }
+}
+
+#[test]
+fn progress_counts_the_verified_traces() {
+    let (files, dir) = (episode_files(&[TaskId::LowTarget], 2), tempfile::tempdir().unwrap());
+    let helpers = TestHelpers::new();
+    let request = RunRequest { seeds: None, ..request(&files, &["turner"]) };
+    let (mut run, _) = Run::open(dir.path(), FolderMode::New, &request, &helpers).unwrap();
+    assert!(play(&mut run, 1, &helpers));
+    let counted = std::sync::Mutex::new(Vec::new());
+    let count = |n: usize| counted.lock().unwrap().push(n);
+    let report = crate::verify::verify_run(run.folder(), run.options(), &helpers, 2, &count);
+    let report = report.unwrap();
+    let mut counted = counted.into_inner().unwrap();
+    counted.sort_unstable();
+    assert_eq!(counted, [1, 2]);
+    let n_decisions = |path: &PathBuf| crate::trace_file::read(path).unwrap().0.decisions().count();
+    let n_expected: usize = run.folder().traces().unwrap().iter().map(n_decisions).sum();
+    assert_eq!((report.agreeing, report.decisions), (2, n_expected));
 }

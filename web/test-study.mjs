@@ -268,7 +268,7 @@ test("a deletion says that it waits for another tab", async () => {
   await page.getByText("This study is open in another tab").waitFor();
   await page.getByText("Your data are being deleted").waitFor();
   await second.close();
-  await page.getByText("All your data in this browser are deleted").waitFor();
+  await page.getByText("are deleted. You may close this page").waitFor();
   assert.equal(await databases(page), 0);
   await context.close();
 });

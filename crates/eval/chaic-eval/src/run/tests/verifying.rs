@@ -338,6 +338,7 @@ impl HelperRegistry for TrainedAgents {
 
 #[test]
 fn weights_perception_and_isolation_in_traces_are_those_of_the_run() {
+    type HeaderChange = fn(&mut Participant);
     fn other() -> Option<String> {
         Some("other".to_owned())
     }
@@ -352,7 +353,7 @@ fn weights_perception_and_isolation_in_traces_are_those_of_the_run() {
     let people = "differs from the one that this run writes: people";
     let perception = "run.json names another perception of the helper";
     // Problems with agents whose weights have changed since, and with unknown agents.
-    let changes: [(AgentId, fn(&mut Participant), [&str; 2]); 9] = [
+    let changes: [(AgentId, HeaderChange, [&str; 2]); 9] = [
         (AgentId::PARTNER, |_| (), ["", ""]),
         // `run.json` has no weights of partners.
         (AgentId::PARTNER, |p| p.weights = other(), ["", ""]),

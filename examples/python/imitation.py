@@ -71,6 +71,8 @@ def main() -> None:
     parser.add_argument("--epochs", type=int, default=10)
     parser.add_argument("--out", type=Path, default=Path("runs/imitation"))
     arguments = parser.parse_args()
+    if arguments.episodes < 2:
+        parser.error("--episodes is at least 2: the last episode is for the test")
     arguments.out.mkdir(parents=True, exist_ok=True)
     torch.manual_seed(0)
     names = chaic.episode_ids("train", "no_constraint")[: arguments.episodes]

@@ -131,7 +131,7 @@ class World:
         behavior: str = "gt",
     ) -> Self: ...
     def reset(self, episode: Episode | None = None, seed: int = 0) -> None:
-        """Starts another episode, or restarts the current one."""
+        """Starts another episode, or restarts the current one, with this seed; 0 is the episode's own."""
     @property
     def episode(self) -> Episode:
         """Current episode."""

@@ -29,10 +29,7 @@ def command_line(maker: Callable[[], Any], images: Sequence[str], image_size: in
     arguments are too large for a command.
     """
     main_file = _main_file()
-    try:
-        pickled = pickle.dumps(maker)
-    except (pickle.PicklingError, AttributeError, TypeError) as error:
-        raise ValueError(f"{_UNREACHABLE}: {error}") from None
+    pickled = _pickled(maker)
     if b"__main__" in pickled and main_file is None:
         raise ValueError(_UNREACHABLE)
     task = {
@@ -56,6 +53,13 @@ def command_line(maker: Callable[[], Any], images: Sequence[str], image_size: in
 _UNREACHABLE = (
     "isolate=True needs a helper that another process can import: a class or function at the top level of a file"
 )
+
+
+def _pickled(maker: Callable[[], Any]) -> bytes:
+    try:
+        return pickle.dumps(maker)
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        raise ValueError(f"{_UNREACHABLE}: {error}") from None
 
 
 def without_partial(maker: Callable[[], Any]) -> Callable[..., Any]:
@@ -92,7 +96,8 @@ def readable(maker: Callable[[], Any]) -> list[str]:
         path = Path(file).absolute()
         found.add(str(path.parent if package and not is_too_wide(path.parent) else path))
     main_file = _main_file()
-    if main_file is not None:
+    # The process runs the script only to import from it.
+    if main_file is not None and b"__main__" in _pickled(maker):
         found.add(main_file)
     return sorted(found)
 

@@ -145,6 +145,8 @@ class HelperEnv(gymnasium.Env[Any, Any]):
         self._update_planner()
         if self._uses_plans:
             self._execute_plan(0.0)
+        if self.render_mode == "human":
+            self.render()
         return self._observe(), self._info(0)
 
     def step(self, action: Any) -> tuple[Obs, float, bool, bool, Info]:

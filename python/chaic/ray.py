@@ -68,6 +68,9 @@ def evaluate(
         options["baselines"] = baselines
     _deprecated.rename_keys(options, RENAMED_OPTIONS)
     options.pop("quiet", None)
+    for name, number in [("shards", shards), ("jobs", jobs), ("tries", tries)]:
+        if number is not None and number < 1:
+            raise ValueError(f"{name} is {number}, expected at least 1")
     if Path(out).exists() and any(Path(out).iterdir()):
         raise ValueError(f"{out} is not empty; choose another folder")
     ray: Any = importlib.import_module("ray")

@@ -278,7 +278,7 @@ class Run:
     @property
     def options(self) -> dict[str, Any]:
         """Options of the run, with the names of run.json."""
-        found: dict[str, Any] = json.loads((self.path / "run.json").read_text())["options"]
+        found: dict[str, Any] = json.loads((self.path / "run.json").read_bytes())["options"]
         return found
 
     def results(self) -> list[dict[str, Any]]:
@@ -373,7 +373,7 @@ def _page_path(out: str | os.PathLike[str] | None) -> Path:
 def _command(*arguments: str) -> str:
     """Runs the command and returns its output. Raises ``RuntimeError`` with its error message if it fails."""
     call = [sys.executable, "-m", "chaic", *arguments]
-    done = subprocess.run(call, capture_output=True, text=True, check=False)
+    done = subprocess.run(call, capture_output=True, encoding="utf-8", check=False)
     if done.returncode != 0:
         raise RuntimeError(done.stderr.strip() or done.stdout.strip())
     return done.stdout

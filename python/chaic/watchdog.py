@@ -74,7 +74,9 @@ class Watchdog:
                 error = raised
             is_expired = self._end(thread)
         except _TimeLimitExceeded:
-            is_expired = self._end(thread)
+            # The interrupted end may have removed the thread from the expired ones already.
+            self._end(thread)
+            is_expired = True
         if is_expired:
             problem = TimeoutError(f"{name} took longer than {self._limit_s:g} s")
             # The traceback shows where the call was.

@@ -128,6 +128,14 @@ def test_folders_that_contain_the_home_or_the_current_folder_are_not_readable(tm
     assert str(folder / "isolated_helpers.py") in readable(helpers.Turner)
 
 
+def test_the_script_is_readable_only_if_the_helper_needs_it(tmp_path, helpers, monkeypatch):
+    script = str(tmp_path / "script.py")
+    monkeypatch.setattr(sys.modules["__main__"], "__file__", script, raising=False)
+    assert script not in readable(helpers.Turner)
+    # An argument may come from the script.
+    assert script in readable(partial(helpers.Waiter, "__main__"))
+
+
 def test_a_process_serves_several_episodes(tmp_path, helpers):
     two = {**OPTIONS, "n_episodes": 2, "jobs": 1}
     run = chaic.evaluate(helpers.Counter, isolate=True, out=tmp_path / "run", **two)

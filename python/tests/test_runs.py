@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import chaic
+import chaic.ray
+from chaic.watchdog import Watchdog, _TimeLimitExceeded
 
 OPTIONS = {"tasks": "low_target", "split": "train", "n_episodes": 1, "jobs": 2, "quiet": True}
 
@@ -134,6 +136,27 @@ def test_a_helper_that_hangs_scores_zero_and_the_run_continues(tmp_path):
     assert "done" in results["fine"]
     with pytest.raises(ValueError):
         chaic.evaluate(Turner, out=tmp_path / "other", limit_s=0.0, **OPTIONS)
+
+
+def test_an_exception_at_the_end_of_a_call_is_a_time_limit():
+    class Late(Watchdog):
+        n_ends = 0
+
+        def _end(self, thread):
+            is_expired = super()._end(thread)
+            self.n_ends += 1
+            if self.n_ends == 1:
+                raise _TimeLimitExceeded
+            return is_expired
+
+    with pytest.raises(TimeoutError, match="act took longer"):
+        Late(1.0).call("act", lambda: "turn_left")
+
+
+def test_numbers_of_a_run_on_ray_are_checked(tmp_path):
+    for number in ("shards", "jobs", "tries"):
+        with pytest.raises(ValueError, match=f"{number} is 0, expected at least 1"):
+            chaic.ray.evaluate(Turner, out=tmp_path / "run", **{number: 0})
 
 
 def test_an_interrupted_run_can_be_resumed(tmp_path):

@@ -123,6 +123,9 @@ def test_an_episode_is_rendered_from_a_given_camera(episode):
     assert chaic.render(world, camera=camera)["rgb"].shape == (65, 65, 3)
     with pytest.raises(ValueError, match="differ in x or z"):
         chaic.camera([0, 2, 0], [0, 0, 0])
+    for fov_deg in (0, 180, float("nan")):
+        with pytest.raises(ValueError, match="no view"):
+            world.render(camera=chaic.camera([0, 2, 0], [1, 2, 0], vertical_fov_deg=fov_deg))
 
 
 def test_show_opens_the_top_view_in_the_browser(episode, monkeypatch):

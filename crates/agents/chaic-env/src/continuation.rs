@@ -156,7 +156,7 @@ fn named_partner(
     helpers: &dyn HelperRegistry,
 ) -> Result<Option<Helper>, ContinuationError> {
     let Some(name) = &header.partner else { return Ok(None) };
-    let partner = helpers.partner(name, None, header.rules.planner);
+    let partner = helpers.partner(name, Some(&header.key()), header.rules.planner);
     let unknown =
         || ContinuationError::Agents(format!("the partner `{name}` cannot act again here"));
     partner.map(Some).ok_or_else(unknown)

@@ -161,9 +161,11 @@ fn seat(
         None => AgentSlot::external(person.grants, person.sensors),
     };
     slot.reset(person.agent, world, header.seed, Some(person.sensors.image_size));
-    // A playback has no history of images, and other sensors mean another agent.
+    // A playback has no history of images, and other sensors mean another agent. An altered header may
+    // have images that exceed their bounds.
     let is_runnable = slot.agent().is_some()
         && slot.sensors == person.sensors
+        && slot.sensors.check().is_ok()
         && slot.sensors.frame_history.is_none();
     let status = if is_runnable { RerunStatus::Equal } else { RerunStatus::Unavailable };
     Seat { agent: person.agent, slot, status }
@@ -187,7 +189,7 @@ fn agent(
         return Some(helpers.make(name?, rules)?.agent);
     }
     match header.partner.as_deref() {
-        Some(name) => Some(helpers.partner(name, None, rules)?.agent),
+        Some(name) => Some(helpers.partner(name, Some(&header.key()), rules)?.agent),
         None => {
             let scene = header.task.info().scene;
             Some(partners::partner(person.persona, scene, rules))

@@ -50,6 +50,10 @@ impl Agent for Reseeded {
         self.agent.perception()
     }
 
+    fn isolation(&self) -> Option<String> {
+        self.agent.isolation()
+    }
+
     fn weights(&self) -> Option<String> {
         self.agent.weights()
     }

@@ -11,7 +11,7 @@ pub struct Limits {
     pub start: Duration,
     /// Time for each decision.
     pub decision: Duration,
-    /// Total waiting time of an episode.
+    /// Total waiting time of an episode: start, briefing and decisions.
     pub episode: Duration,
     /// Memory of all of its processes together, MiB. Without a sandbox, memory of each (Linux).
     pub memory_mib: u64,

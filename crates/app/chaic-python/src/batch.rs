@@ -233,7 +233,7 @@ impl Batch {
 
     /// Sets the next actions of all slots that need one: int64 [slots, 3], rows of kind (`ACTIONS`), column and row
     /// of a pixel. Rows of other slots are ignored.
-    fn submit(&mut self, actions: PyReadonlyArray2<'_, i64>) -> PyResult<()> {
+    fn submit(&mut self, py: Python<'_>, actions: PyReadonlyArray2<'_, i64>) -> PyResult<()> {
         let envs = self.envs()?;
         let n = envs.slots().len();
         let actions = actions.as_array();
@@ -251,10 +251,12 @@ impl Batch {
                 submitted.push((k, action::from_row([row[0], row[1], row[2]])?));
             }
         }
-        for (k, action) in submitted {
-            envs.submit(k, action);
-        }
-        Ok(())
+        // The pixel of an action without an image needs a rendered view.
+        detached(py, || {
+            for (k, action) in submitted {
+                envs.submit(k, action);
+            }
+        })
     }
 
     /// Returns the number of frames that have passed in each world.

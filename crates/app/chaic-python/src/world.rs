@@ -7,7 +7,7 @@ use chaic_core::geom::Camera;
 use chaic_core::{AgentError, AgentId};
 use chaic_env::trace::Record;
 use chaic_env::{AdvanceOutcome, Env, EnvSnapshot, RewardTerms};
-use chaic_render::{Channels, View, floor_plan};
+use chaic_render::{Channels, Projection, View, floor_plan};
 use chaic_world::Event;
 use numpy::{PyArray1, PyArray3, PyArrayMethods as _};
 use pyo3::prelude::*;
@@ -103,7 +103,7 @@ impl World {
         Ok(World { env, options, episode, events: Vec::new() })
     }
 
-    /// Starts another episode, or restarts the current one.
+    /// Starts another episode, or restarts the current one, with this seed; 0 is the episode's own.
     #[pyo3(signature = (episode=None, seed=0))]
     fn reset(
         &mut self,
@@ -321,7 +321,7 @@ impl World {
         let view = match camera {
             Some(camera) => {
                 let camera: Camera = depythonize(camera).map_err(mistake)?;
-                check_camera_size(&camera)?;
+                check_camera(&camera)?;
                 View::from_camera(camera, channels)
             }
             None => View::from_agent(env.world(), id, image_size, channels),
@@ -386,7 +386,16 @@ fn not_waiting(agent: u8) -> String {
     format!("agent {agent} needs no action now; `waiting()` lists the agents that do")
 }
 
-/// Checks the image size of a camera.
-fn check_camera_size(camera: &Camera) -> PyResult<()> {
-    [camera.width, camera.height].into_iter().try_for_each(|side| sensors(&[], side).map(|_| ()))
+/// Checks that a camera has a valid image size and a view.
+fn check_camera(camera: &Camera) -> PyResult<()> {
+    [camera.width, camera.height]
+        .into_iter()
+        .try_for_each(|side| sensors(&[], side).map(|_| ()))?;
+    if Projection::from_camera(camera).is_some() {
+        return Ok(());
+    }
+    Err(mistake(
+        "the camera has no view: eye_in_world is finite, world_from_camera a rotation and \
+         vertical_fov_rad between 0.01 and 3.1",
+    ))
 }

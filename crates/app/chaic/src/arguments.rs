@@ -195,12 +195,19 @@ pub enum SplitArgument {
 #[derive(Clone, Debug)]
 pub struct Tasks(pub Vec<TaskId>);
 
-/// Parses task names, separated by commas.
+/// Parses task names, separated by commas. A repeated name counts once.
 fn tasks(text: &str) -> Result<Tasks, String> {
     if text == "all" {
         return Ok(Tasks(TaskId::paper().collect()));
     }
-    text.split(',').map(task).collect::<Result<_, _>>().map(Tasks)
+    let mut tasks: Vec<TaskId> = Vec::new();
+    for name in text.split(',') {
+        let id = task(name)?;
+        if !tasks.contains(&id) {
+            tasks.push(id);
+        }
+    }
+    Ok(Tasks(tasks))
 }
 
 fn task(name: &str) -> Result<TaskId, String> {

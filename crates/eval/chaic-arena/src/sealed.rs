@@ -226,9 +226,12 @@ impl SealedSplit {
         format!("{task}-{k:03}.json")
     }
 
-    /// Refuses a folder with episodes that do not belong to the split, such as those of a larger one. They
-    /// would be played with it.
-    fn check_folder(&self, folder: &Path) -> Result<(), ArenaError> {
+    /// Refuses an existing folder with episodes that do not belong to the split, such as those of a larger
+    /// one. They would be played with it.
+    ///
+    /// # Errors
+    /// [`ArenaError::UnknownFiles`], or if the folder cannot be read.
+    pub fn check_folder(&self, folder: &Path) -> Result<(), ArenaError> {
         let of_task = |task: &TaskId| {
             let task = *task;
             (0..self.n_episodes).map(move |k| SealedSplit::file_name(task, k))

@@ -126,14 +126,9 @@ impl ColumnStatistics {
     }
 }
 
-/// Numeric features with their number of columns.
-const NUMERIC_FEATURES: [(&str, usize); 5] = [
-    ("observation.state", STATE.len()),
-    ("action", ACTION.len()),
-    ("next.reward", 1),
-    ("timestamp", 1),
-    ("frame_index", 1),
-];
+/// Numeric features, in the order of the statistics.
+const NUMERIC_FEATURES: [&str; 5] =
+    ["observation.state", "action", "next.reward", "timestamp", "frame_index"];
 
 /// One sampled frame.
 struct SampledFrame {
@@ -199,6 +194,8 @@ impl LeRobotWriter {
         let decisions: Vec<&Decision> = trace.decisions().filter(|d| d.agent == agent).collect();
         let end = trace.end().map_or(Frame::MAX, |end| end.frame);
         let mut samples = Vec::new();
+        // The images of a discarded episode do not count.
+        let mut colors = self.colors.clone();
         loop {
             let frame = playback.world().state().frame;
             // No action follows the last frame.
@@ -209,7 +206,7 @@ impl LeRobotWriter {
                     return Ok(false);
                 }
                 let image = render_view(&scene, playback.world(), agent, image_size);
-                self.add_colors(&image);
+                add_colors(&mut colors, &image);
                 video.push(&image)?;
             }
             let world = playback.world();
@@ -227,20 +224,10 @@ impl LeRobotWriter {
             }
         }
         video.finish()?;
+        self.colors = colors;
         let done = fraction_done(playback.world());
         self.write_episode(&trace.header.task.info().title.to_lowercase(), &samples, done)?;
         Ok(true)
-    }
-
-    /// Adds an image to the color statistics: every fourth pixel of every fourth row.
-    fn add_colors(&mut self, image: &RgbImage) {
-        for (x, y, pixel) in image.enumerate_pixels() {
-            if x % 4 == 0 && y % 4 == 0 {
-                for (summary, value) in self.colors.iter_mut().zip(pixel.0) {
-                    summary.add(&[f64::from(value) / 255.0]);
-                }
-            }
-        }
     }
 
     fn write_episode(
@@ -406,7 +393,7 @@ impl LeRobotWriter {
         let named = NUMERIC_FEATURES
             .iter()
             .zip(&self.statistics)
-            .map(|((name, _), s)| ((*name).to_owned(), to_json(s)));
+            .map(|(name, s)| ((*name).to_owned(), to_json(s)));
         let mut stats: serde_json::Map<String, Value> = named.collect();
         let statistic = |k: usize| {
             let channels = self.colors.iter().map(|s| json!([s.min_max_mean_std()[k]]));
@@ -523,6 +510,17 @@ fn write_table(
 ) -> Result<(), ExportError> {
     let convert = |problem| ExportError::Table { path: path.to_owned(), problem };
     table::write(path, columns, entries).map_err(convert)
+}
+
+/// Adds an image to the color statistics: every fourth pixel of every fourth row.
+fn add_colors(colors: &mut [ColumnStatistics; 3], image: &RgbImage) {
+    for (x, y, pixel) in image.enumerate_pixels() {
+        if x % 4 == 0 && y % 4 == 0 {
+            for (summary, value) in colors.iter_mut().zip(pixel.0) {
+                summary.add(&[f64::from(value) / 255.0]);
+            }
+        }
+    }
 }
 
 /// Renders the view of an agent.

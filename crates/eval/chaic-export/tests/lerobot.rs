@@ -106,6 +106,9 @@ fn an_episode_is_exported_as_a_table_and_a_video() {
     let stats: serde_json::Value =
         serde_json::from_slice(&fs::read(out.join("meta/stats.json")).unwrap()).unwrap();
     assert_eq!(stats["observation.state"]["mean"].as_array().unwrap().len(), 9);
+    // Every fourth pixel of every fourth row, without the images of the interrupted episode.
+    let n_pixels = (8 * 8 * n) as f64;
+    assert_eq!(stats["observation.images.ego"]["count"][0].as_f64(), Some(n_pixels));
 }
 
 #[test]

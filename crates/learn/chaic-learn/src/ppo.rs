@@ -248,6 +248,10 @@ pub fn update<M: ActorCritic>(
     }
     if let Some(reference) = reference {
         samples.par_chunks_mut(REFERENCE_BATCH).for_each(|batch| {
+            // The first minibatch then returns `None`.
+            if stop.load(Ordering::Relaxed) {
+                return;
+            }
             let mut pass = Pass::new(model.network(), widest());
             let observations = batch.iter().map(|s| &s.transition.observation);
             let outputs = model.forward(reference, observations, &mut pass);

@@ -18,12 +18,13 @@ const MAX_BYTES: u64 = 1 << 22;
 /// [`TrainingError::Config`] if a key is unknown, a value is out of bounds, or an input file that it
 /// names cannot be used.
 pub fn read_config<T: Trainer>(path: &Path) -> Result<T::Config, TrainingError> {
-    parse_bytes::<T>(path, &read_user_file(path, MAX_BYTES)?)
+    parse_bytes(path, &read_user_file(path, MAX_BYTES)?, parse_config::<T>)
 }
 
 /// Reads a configuration file, if given, and changes the keys that a user assigned on the command
 /// line: `KEY=VALUE` with a TOML key such as `rollout.image_size` and a TOML value, or text without
-/// quotes. The key may be an old name. Missing keys get their defaults.
+/// quotes. The key may be an old name. Missing keys get their defaults. Input files that the
+/// assignments replace are not read.
 ///
 /// # Errors
 /// As [`read_config`], and if an assignment is not of this form.
@@ -31,10 +32,15 @@ pub fn read_config_with<T: Trainer>(
     path: Option<&Path>,
     assignments: &[String],
 ) -> Result<T::Config, TrainingError> {
-    let config = path.map(read_config::<T>).transpose()?.unwrap_or_default();
     if assignments.is_empty() {
-        return Ok(config);
+        return path.map_or_else(|| Ok(T::Config::default()), read_config::<T>);
     }
+    // The whole configuration is checked only after the assignments.
+    let read = |path: &Path| {
+        let bytes = read_user_file(path, MAX_BYTES)?;
+        parse_bytes(path, &bytes, parse_values::<T>)
+    };
+    let config = path.map(read).transpose()?.unwrap_or_default();
     let mut table = Table::try_from(config).expect("a configuration serializes to TOML");
     for assignment in assignments {
         let invalid =
@@ -109,13 +115,17 @@ fn without_line(message: &str) -> &str {
 /// # Errors
 /// As [`read_config`], and if the file is a link.
 pub(crate) fn read_written_config<T: Trainer>(path: &Path) -> Result<T::Config, TrainingError> {
-    parse_bytes::<T>(path, &read_bounded(path, MAX_BYTES)?)
+    parse_bytes(path, &read_bounded(path, MAX_BYTES)?, parse_config::<T>)
 }
 
-fn parse_bytes<T: Trainer>(path: &Path, bytes: &[u8]) -> Result<T::Config, TrainingError> {
+fn parse_bytes<C>(
+    path: &Path,
+    bytes: &[u8],
+    parse_text: impl FnOnce(&str) -> Result<C, String>,
+) -> Result<C, TrainingError> {
     let invalid = |problem: String| TrainingError::Config { path: path.to_owned(), problem };
     let text = std::str::from_utf8(bytes).map_err(|e| invalid(e.to_string()))?;
-    parse_config::<T>(text).map_err(invalid)
+    parse_text(text).map_err(invalid)
 }
 
 /// Parses the text of a configuration file.
@@ -123,13 +133,18 @@ fn parse_bytes<T: Trainer>(path: &Path, bytes: &[u8]) -> Result<T::Config, Train
 /// # Errors
 /// One line that describes the problem.
 pub fn parse_config<T: Trainer>(text: &str) -> Result<T::Config, String> {
+    let config = parse_values::<T>(text)?;
+    // The text may hold aliases, which have no bounds; the parsed configuration holds current keys.
+    check_config::<T>(&config)?;
+    Ok(config)
+}
+
+/// Parses a configuration without checking it as a whole.
+fn parse_values<T: Trainer>(text: &str) -> Result<T::Config, String> {
     // Bounds come first: the parser would refuse -1 without naming key and bounds.
     let table: Table = parse(text)?;
     bounds::check(&table, T::BOUNDS)?;
-    let config = with_nested_defaults::<T>(table, parse(text)?);
-    // The table may hold aliases, which have no bounds; the parsed configuration holds current keys.
-    check_config::<T>(&config)?;
-    Ok(config)
+    Ok(with_nested_defaults::<T>(table, parse(text)?))
 }
 
 /// Gives the missing keys of inner tables the defaults of this training. Those of the table's own type

@@ -165,3 +165,18 @@ fn a_person_and_an_unknown_helper_have_no_memory() {
     trace.header.people[0].input = Some("plans".to_owned());
     assert!(rerun(&trace, &episode).iter().all(|(_, s)| *s == RerunStatus::Unavailable));
 }
+
+#[test]
+fn no_agent_runs_with_images_that_exceed_their_bounds() {
+    let episode = find_episode("no_constraint/test/00").unwrap();
+    let helper = BuiltInHelpers.make("rhp", PlannerRules::paper());
+    let config = EpisodeConfig::new(&episode, "rhp");
+    let mut trace = played(config, EpisodeAgents::new(helper, None));
+    for image_size in [0, u32::MAX] {
+        for person in &mut trace.header.people {
+            person.sensors.image_size = image_size;
+        }
+        let statuses = rerun(&trace, &episode);
+        assert!(statuses.iter().all(|status| *status == (0, RerunStatus::Unavailable)));
+    }
+}

@@ -43,7 +43,6 @@ impl PromptContext {
         let listed = keep_nearest(plans, length.plans_per_kind);
         let labels = |classes: &[ClassId]| {
             let mut names: Vec<String> = classes.iter().map(|c| plain(c.info().label)).collect();
-            names.dedup();
             let mut seen = std::collections::BTreeSet::new();
             names.retain(|n| seen.insert(n.clone()));
             names

@@ -110,7 +110,7 @@ pub struct ExecArguments {
     /// Time limit of the start, and of a briefing, seconds [default: 120].
     #[arg(long, value_name = "S", value_parser = seconds)]
     pub exec_start_s: Option<Duration>,
-    /// Time limit of all decisions of an episode, seconds [default: 3600].
+    /// Time limit of start, briefing and decisions of an episode together, seconds [default: 3600].
     #[arg(long, value_name = "S", value_parser = seconds)]
     pub exec_episode_s: Option<Duration>,
     /// Memory limit of all processes of a helper together, MiB; with --exec-trust of each process

@@ -1,12 +1,14 @@
 //! Promises: every numeric option has a range, which its help states. Every command is in one group of the help, and
 //! has three examples that parse. No help text has private terms.
+//! A repeated task counts once.
 
 use std::any::TypeId;
 
+use chaic_core::TaskId;
 use clap::{Arg, Command};
 
 use super::examples::examples;
-use super::{command, help};
+use super::{command, help, tasks};
 
 /// Returns the commands below one, without hidden ones, by their full names.
 fn visible_commands(parent: &Command, path: &str) -> Vec<(String, Command)> {
@@ -165,4 +167,11 @@ fn old_spellings_parse() {
         let parsed = command().try_get_matches_from(words(line));
         assert!(parsed.is_ok(), "{line}: {}", parsed.expect_err("it failed"));
     }
+}
+
+/// `chaic export episodes` counted the episodes of a repeated task twice.
+#[test]
+fn a_repeated_task_counts_once() {
+    let parsed = tasks("shopping,obstacle,shopping").expect("names of tasks");
+    assert_eq!(parsed.0, [TaskId::Shopping, TaskId::Obstacle]);
 }

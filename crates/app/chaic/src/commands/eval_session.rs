@@ -36,6 +36,9 @@ pub(super) struct Session<'a> {
     partners: GivenPartners,
     /// Options that name them, which a resumed run needs again.
     partner_options: String,
+    /// Options of language models, which a resumed run needs again. The partner at the interruption may ask
+    /// none, but a later one does.
+    language_options: String,
 }
 
 /// A run after it was played.
@@ -64,7 +67,8 @@ impl<'a> Session<'a> {
         start_threads(jobs)?;
         hide_worker_panics();
         let shard = arguments.shard.unwrap_or(Shard::WHOLE);
-        Ok(Session { launcher, stop, jobs, shard, partners, partner_options })
+        let language_options = llm::resume_options(&arguments.language);
+        Ok(Session { launcher, stop, jobs, shard, partners, partner_options, language_options })
     }
 
     /// Plays the run in a folder. `part` names it among the runs of the command.
@@ -95,7 +99,7 @@ impl<'a> Session<'a> {
             });
             bars.clear();
             let folder = part.and(path.parent()).unwrap_or(path);
-            let resume = how_to_resume(folder, arguments, &self.partner_options);
+            let resume = self.how_to_resume(folder, arguments);
             let is_complete = played.map_err(|error| with_hint(error.into(), &resume))?;
             if let Some(problem) = language.and_then(LanguageHelpers::problem) {
                 bail!("paused: {problem}\n{resume}");
@@ -146,6 +150,17 @@ impl<'a> Session<'a> {
             commands.check_resumed(path)?;
         }
         then(&commands, language.as_ref())
+    }
+
+    /// Returns the command that continues a run.
+    fn how_to_resume(&self, path: &Path, arguments: &EvalArguments) -> String {
+        let Session { partner_options: partners, language_options: language, .. } = self;
+        let helpers = resume_options(arguments);
+        let shard = arguments.shard.map_or_else(String::new, |shard| format!(" --shard {shard}"));
+        format!(
+            "continue with: chaic eval --resume --out {}{shard}{partners}{helpers}{language}",
+            quoted_path(path)
+        )
     }
 }
 
@@ -235,17 +250,6 @@ pub(super) fn free_folder(name: &str) -> Result<PathBuf> {
     let numbered = |k: u32| if k == 1 { name.to_owned() } else { format!("{name}-{k}") };
     let mut candidates = (1..MAX_RUNS).map(|k| Path::new("runs").join(numbered(k)));
     candidates.find(|p| !p.exists()).context("every runs/... folder is taken; give one with --out")
-}
-
-/// Returns the command that continues a run.
-fn how_to_resume(path: &Path, arguments: &EvalArguments, partner_options: &str) -> String {
-    let language = llm::resume_options(&arguments.language);
-    let helpers = resume_options(arguments);
-    let shard = arguments.shard.map_or_else(String::new, |shard| format!(" --shard {shard}"));
-    format!(
-        "continue with: chaic eval --resume --out {}{shard}{partner_options}{helpers}{language}",
-        quoted_path(path)
-    )
 }
 
 /// Hides panic messages of workers, which would interrupt the bars. The run records and prints them.

@@ -219,6 +219,8 @@ fn finish(
 
 fn how_to_resume(arguments: &FidelityArguments) -> String {
     let doc = arguments.doc.as_deref().map(|doc| format!(" --doc {}", quoted_path(doc)));
+    let switches = arguments.switch.as_ref().map(|names| format!(" --switch {}", names.join(",")));
     let out = quoted_path(&arguments.out);
-    format!("continue with: chaic fidelity --resume --out {out}{}", doc.unwrap_or_default())
+    let options = [doc, switches].into_iter().flatten().collect::<String>();
+    format!("continue with: chaic fidelity --resume --out {out}{options}")
 }

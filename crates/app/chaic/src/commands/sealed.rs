@@ -103,6 +103,9 @@ pub(super) fn open(
         let text = format!("{name}: the split has no partners; omit --partners");
         return Err(EvalError::Options(text).into());
     }
+    if out.is_dir() {
+        split.check_folder(out)?;
+    }
     // Other episodes than the committed ones must not remain on the disk, so the check comes first.
     let stop = interrupt::stop_flag()?;
     let Some(opened) = generate(&split, None, stop)? else {

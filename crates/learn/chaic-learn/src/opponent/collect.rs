@@ -438,9 +438,9 @@ pub fn write(path: &Path, samples: &[LabeledWindow], is_granted: bool) -> Result
 /// Reads windows that [`write()`] wrote into a training folder.
 ///
 /// # Errors
-/// If the file is a link, cannot be read, or holds no windows.
-pub fn read(path: &Path) -> Result<Vec<LabeledWindow>, CollectError> {
-    parse_file(path, &read_bounded(path, MAX_BYTES)?)
+/// As [`read_from_user_path`], and if the file is a link.
+pub fn read(path: &Path, is_granted: bool) -> Result<Vec<LabeledWindow>, CollectError> {
+    parse_granted(path, &read_bounded(path, MAX_BYTES)?, is_granted)
 }
 
 /// Reads windows from a file that a user named, which may be a link.
@@ -452,9 +452,16 @@ pub fn read_from_user_path(
     path: &Path,
     is_granted: bool,
 ) -> Result<Vec<LabeledWindow>, CollectError> {
-    let bytes = read_user_file(path, MAX_BYTES)?;
-    let windows = parse_file(path, &bytes)?;
-    let metadata = SafeTensors::read_metadata(&bytes).ok();
+    parse_granted(path, &read_user_file(path, MAX_BYTES)?, is_granted)
+}
+
+fn parse_granted(
+    path: &Path,
+    bytes: &[u8],
+    is_granted: bool,
+) -> Result<Vec<LabeledWindow>, CollectError> {
+    let windows = parse_file(path, bytes)?;
+    let metadata = SafeTensors::read_metadata(bytes).ok();
     let metadata = metadata.as_ref().and_then(|(_, metadata)| metadata.metadata().as_ref());
     // Files of earlier versions have no metadata.
     match metadata.and_then(|metadata| metadata.get(GRANTED)) {

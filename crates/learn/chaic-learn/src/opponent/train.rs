@@ -181,7 +181,8 @@ impl Trainer for OpponentTrainer {
                 continue;
             }
             if kind(&path)? != EntryKind::Missing {
-                windows.push(read(&path).map_err(TrainingError::from_data)?);
+                let read = read(&path, config.collect.granted);
+                windows.push(read.map_err(TrainingError::from_data)?);
                 continue;
             }
             let max_per_class = match split {
@@ -288,11 +289,11 @@ impl Trainer for OpponentTrainer {
     }
 }
 
-/// Removes a random fraction of the windows, and returns it.
+/// Removes a random fraction of the windows, at least one, and returns it.
 fn hold_out(windows: &mut Vec<LabeledWindow>, config: &OpponentConfig) -> Vec<LabeledWindow> {
     RngStream::new(config.seed, "held-out windows", 0).shuffle(windows);
     let n = (windows.len() as f32 * config.held_out_fraction) as usize;
-    windows.split_off(windows.len() - n)
+    windows.split_off(windows.len().saturating_sub(n.max(1)))
 }
 
 /// Sums of losses over windows.

@@ -24,6 +24,7 @@ use crate::rollout::{RolloutEpisode, RolloutError};
 use crate::rollout_config::{
     MAX_VALIDATION_EPISODES, REWARD, check_splits, read_opponent, validation_episodes,
 };
+use crate::train::read_reference;
 
 pub use super::config::VisualConfig;
 
@@ -32,6 +33,8 @@ pub struct VisualTrainer {
     setup: TrainingSetup,
     learner: Learner,
     updates: u64,
+    /// Parameters of the initial policy, if a KL penalty refers to them.
+    reference: Option<Vec<f32>>,
     runners: Vec<EnvRunner>,
     /// Progress of the environments before an update that was stopped; it is restored before the
     /// next update.
@@ -85,7 +88,7 @@ impl Trainer for VisualTrainer {
 
     fn new(
         config: &VisualConfig,
-        _: &Path,
+        folder: &Path,
         _: &mut dyn FnMut(&str),
         stop: &AtomicBool,
     ) -> Result<Option<VisualTrainer>, TrainingError> {
@@ -97,13 +100,21 @@ impl Trainer for VisualTrainer {
         if let (Some(range), Some(opponent)) = (model.opponent_range(), &opponent) {
             learner.parameters[range].copy_from_slice(opponent.parameters());
         }
+        let reference = read_reference(&config.ppo, folder, model.network(), &model.kind());
+        let reference = reference.map_err(TrainingError::InvalidConfig)?;
         let progress = vec![EpisodeProgress::default(); config.n_envs];
         let setup = TrainingSetup { config: config.clone(), perception, opponent, model };
         let runners = replay(&setup, &progress, stop);
         let runners = runners.map_err(|e| TrainingError::InvalidConfig(format!("`tasks` {e}")))?;
         let Some(runners) = runners else { return Ok(None) };
-        let trainer = VisualTrainer { setup, learner, updates: 0, runners, interrupted_at: None };
-        Ok(Some(trainer))
+        Ok(Some(VisualTrainer {
+            setup,
+            learner,
+            updates: 0,
+            reference,
+            runners,
+            interrupted_at: None,
+        }))
     }
 
     fn check(config: &VisualConfig) -> Result<(), String> {
@@ -244,7 +255,7 @@ impl VisualTrainer {
     /// Collects experience and updates the network. Returns `None` if it was stopped, with
     /// environments and learner in an unspecified state.
     fn update(&mut self, stop: &AtomicBool) -> Option<Metrics> {
-        let VisualTrainer { setup, learner, updates, runners, .. } = self;
+        let VisualTrainer { setup, learner, updates, reference, runners, .. } = self;
         let TrainingSetup { config, model, .. } = &*setup;
         let parameters = learner.parameters.clone();
         let collect = |runner: &mut EnvRunner| runner.collect(setup, &parameters, *updates, stop);
@@ -258,7 +269,8 @@ impl VisualTrainer {
         let trajectories: Vec<_> = experience.into_iter().flat_map(|e| e.trajectories).collect();
         let progress_remaining = 1.0 - *updates as f32 / config.n_updates as f32;
         let schedule = Schedule { seed: config.seed, iteration: *updates, progress_remaining };
-        let stats = update(&config.ppo, model, learner, &trajectories, None, schedule, stop)?;
+        let reference = reference.as_deref();
+        let stats = update(&config.ppo, model, learner, &trajectories, reference, schedule, stop)?;
         *updates += 1;
         let mut named = metrics([("reward", reward), ("invalid", invalid)]);
         named.extend(stats.to_metrics());

@@ -59,14 +59,14 @@ fn windows_are_within_bounds_and_read_back_unchanged() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("windows.safetensors");
     write(&path, &samples, true).unwrap();
-    assert!(samples == read(&path).unwrap());
+    assert!(samples == read(&path, true).unwrap());
     assert!(samples == read_from_user_path(&path, true).unwrap());
-    let problem = read_from_user_path(&path, false).unwrap_err().to_string();
+    let problem = read(&path, false).unwrap_err().to_string();
     assert!(problem.contains("granted = true"), "{problem}");
     let bytes = fs::read(&path).unwrap();
     for n in [0, 7, bytes.len() / 2, bytes.len() - 1] {
         fs::write(&path, &bytes[..n]).unwrap();
-        let problem = read(&path).err().unwrap().to_string();
+        let problem = read(&path, true).err().unwrap().to_string();
         assert!(problem.contains("windows.safetensors") && !problem.contains('\n'), "{problem}");
     }
 }
@@ -139,7 +139,7 @@ fn the_model_learns_and_interruption_changes_no_bit() {
     let curves = fs::read_to_string(out.join(CURVES)).unwrap();
     assert!(curves.contains("goal_accuracy"), "{curves}");
     // On its training data the trained model is better than the initial one.
-    let samples = read(&out.join("windows.safetensors")).unwrap();
+    let samples = read(&out.join("windows.safetensors"), true).unwrap();
     let bytes = fs::read(out.join("opponent.safetensors")).unwrap();
     let learned =
         OpponentReport::new(&OpponentModel::from_bytes(&bytes).unwrap(), &samples, &NEVER_STOP);

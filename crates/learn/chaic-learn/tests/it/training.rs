@@ -26,7 +26,9 @@ use chaic_learn::visual::train::{VisualConfig, VisualTrainer};
 use chaic_nn::weights;
 use chaic_training::conformance::{bounds_every_number, refuses_damaged_checkpoints};
 use chaic_training::run::checkpoint_bytes;
-use chaic_training::{CHECKPOINT, Trainer, TrainingError, TrainingRun, parse_config};
+use chaic_training::{
+    CHECKPOINT, Trainer, TrainingError, TrainingRun, parse_config, read_config_with,
+};
 
 static NEVER_STOP: AtomicBool = AtomicBool::new(false);
 
@@ -122,6 +124,13 @@ fn experts_generators_and_penalties_are_checked_before_a_training() {
     let problem = started.err().unwrap().to_string();
     assert!(problem.contains("kl_coef") && problem.contains("--weights"), "{problem}");
     assert!(!out.exists());
+    let mut config = VisualConfig::default();
+    config.ppo.kl_coef = 0.1;
+    let started =
+        TrainingRun::<VisualTrainer>::start(&out, &config, None, &mut |_| (), &NEVER_STOP);
+    let problem = started.err().unwrap().to_string();
+    assert!(problem.contains("kl_coef") && problem.contains("--weights"), "{problem}");
+    assert!(!out.exists());
     for (text, words) in [
         ("[expert]\nhelper = \"follow\"", ["expert.helper", "infer, rhp, oracle"]),
         ("[rollout]\nsplits = [\"test\"]", ["rollout.splits", "gen, gen-standard"]),
@@ -131,6 +140,24 @@ fn experts_generators_and_penalties_are_checked_before_a_training() {
         let problem = parse_config::<PolicyTrainer<CloningConfig>>(text).unwrap_err();
         assert!(words.iter().all(|word| problem.contains(word)), "{problem}");
     }
+}
+
+#[test]
+fn assignments_replace_values_of_the_file_before_they_are_checked() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("visual.toml");
+    fs::write(&path, "n_updates = 7\nopponent = \"missing\"\ntasks = []\n").unwrap();
+    let weights = folder.path().join("opponent.safetensors");
+    let network = opponent::network::network().network;
+    let kind = opponent::network::kind(false);
+    let bytes = weights::to_bytes(&network, &network.init_parameters(1), kind).unwrap();
+    fs::write(&weights, bytes).unwrap();
+    let of_opponent = format!("opponent={}", weights.display());
+    let read = |set: &[String]| read_config_with::<VisualTrainer>(Some(&path), set);
+    assert!(read(&[]).is_err() && read(std::slice::from_ref(&of_opponent)).is_err());
+    let config = read(&[of_opponent, "tasks=[\"shopping\"]".to_owned()]).unwrap();
+    assert_eq!((config.n_updates, config.opponent), (7, Some(weights)));
+    assert_eq!(config.tasks, [TaskId::Shopping]);
 }
 
 #[test]

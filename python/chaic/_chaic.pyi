@@ -112,7 +112,7 @@ class World:
     - `partner`: `"rules"` for the partner of the task, or `"caller"`;
     - `grants` (docs/grants.md), `images` (of `"rgb"`, `"depth"`, `"ids"`) and `image_size` of the caller's agents;
     - `partner_image_size`: image size of all other agents; by default that of scored runs;
-    - `rules`, `set` and `appearance`, as in `chaic eval`."""
+    - `rules`, `set` and `appearance`, as in `chaic eval`. `grants`, `images` and `set` are one string or several."""
     def __new__(
         cls,
         episode: Episode,
@@ -181,12 +181,12 @@ class World:
         self,
         agent: int | None = None,
         camera: Mapping[str, Any] | None = None,
-        image_size: int = 512,
+        image_size: int | None = None,
         images: Sequence[str] | None = None,
     ) -> dict[str, NDArray[Any]]:
         """Renders the view of an agent, by default the helper if there is one, or of a camera (a dictionary as
-        `Observation.camera`). Returns arrays by name: `rgb`, `depth`, `ids`. The method ignores grants; agents use
-        `observe`."""
+        `Observation.camera`). `image_size` is the width and height of an agent's view, 512 by default; a camera has its
+        own. Returns arrays by name: `rgb`, `depth`, `ids`. The method ignores grants; agents use `observe`."""
     def floor_plan(self, width: int = 640) -> NDArray[np.uint8]:
         """Draws the top view, uint8 [height, width, 3]."""
     def show(self) -> None:

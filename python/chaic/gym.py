@@ -50,7 +50,9 @@ class HelperEnv(gymnasium.Env[Any, Any]):
       (``chaic.PROPRIOCEPTION``), ``map`` (egocentric map of the memory, ``chaic.MAP``), and ``ids`` (needs the grant).
     - ``action``: ``"primitive"`` is a kind of action and a pixel. ``"plan"`` is the index of an offered plan
       (``observation["plans"]``, ``info["action_mask"]``), which chaic's planner executes.
-    - ``perception`` of planner and map: ``"gt"``, which adds the grant ``ids``, or ``"learned"``.
+    - ``perception`` of planner and map: ``"gt"``, which adds the grant ``ids``, or ``"learned"``. Without both, only
+      ``"gt"`` is valid.
+    - ``grants`` and ``set``: one string or several, such as ``set="world.stride_m=0.5"``.
     - ``partner_image_size``: width and height of the partner's images, pixels; ``None`` for those of scored runs. A smaller
       size is faster and reduces what the partner sees. ``minds_image_size`` is its deprecated name.
 
@@ -90,11 +92,14 @@ class HelperEnv(gymnasium.Env[Any, Any]):
         self.source = EpisodeSource(task, split)
         images = spaces.image_parts(self.parts)
         grants = (grants,) if isinstance(grants, str) else tuple(grants)
+        settings = [set] if isinstance(set, str) else list(set)
         self._planner: Planner | None = None
         if self._uses_plans or "map" in self.parts:
-            self._planner = Planner(perception, image_size, rules=rules, set=list(set))
+            self._planner = Planner(perception, image_size, rules=rules, set=settings)
             images = sorted({*images, *self._planner.images})
             grants = sorted({*grants, *self._planner.grants})
+        elif perception != "gt":
+            raise ValueError('perception applies to action="plan" and to the part "map" only; add one of them')
         #: Grants of the helper (docs/grants.md).
         self.grants = tuple(grants)
         self._options: dict[str, Any] = {
@@ -102,10 +107,12 @@ class HelperEnv(gymnasium.Env[Any, Any]):
             "image_size": image_size,
             "grants": list(self.grants),
             "rules": rules,
-            "set": list(set),
+            "set": settings,
             "appearance": appearance,
             "partner_image_size": partner_image_size,
         }
+        # Invalid options raise an error here, not in the first reset.
+        World(self.source.get(self.source.ids[0]), 0, **self._options)
         self.observation_space = spaces.observation_space(self.parts, image_size, self._uses_plans)
         self.action_space = (
             spaces.plan_space() if self._uses_plans else spaces.primitive_space(image_size)
@@ -125,8 +132,6 @@ class HelperEnv(gymnasium.Env[Any, Any]):
         self._has_images = bool(spaces.image_parts(self.parts))
         self._events: list[dict[str, Any]] = []
         self._window: Any = None
-        # Invalid options raise an error here, not in the first reset.
-        World(self.source.get(self.source.ids[0]), 0, **self._options)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

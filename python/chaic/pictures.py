@@ -71,10 +71,13 @@ def render(
     *,
     agent: int | None = None,
     camera: Mapping[str, Any] | None = None,
-    image_size: int = 512,
-    images: Sequence[str] = ("rgb",),
+    image_size: int | None = None,
+    images: str | Sequence[str] = ("rgb",),
 ) -> dict[str, NDArray[Any]]:
-    """Renders the view of an agent (0 the partner, 1 the helper) or of a ``camera``, for a world or the start of an episode."""
+    """Renders the view of an agent (0 the partner, 1 the helper) or of a ``camera``, for a world or the start of an episode.
+
+    ``image_size`` is the width and height of an agent's view, 512 by default; a camera has its own.
+    """
     world = of if isinstance(of, World) else World(of)
     return world.render(agent=agent, camera=camera, image_size=image_size, images=images)
 

@@ -12,7 +12,8 @@ import os
 import shutil
 import tarfile
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,48 @@ def _play(
         return _pack(out)
 
 
+def _play_missing(ray: Any, start: Callable[[int], Any], folders: Mapping[int, Path], tries: int) -> None:
+    """Plays the shards whose folders do not exist yet; ``start`` starts the task of a shard."""
+    remaining_tries = {k: tries for k, folder in folders.items() if not folder.is_dir()}
+    pending: dict[Any, int] = {}
+    try:
+        while remaining_tries or pending:
+            for k in [k for k in remaining_tries if k not in pending.values()]:
+                pending[start(k)] = k
+            done, _ = ray.wait(list(pending), num_returns=1)
+            for reference in done:
+                k = pending.pop(reference)
+                try:
+                    data = ray.get(reference)
+                except (ray.exceptions.RayError, OSError) as error:
+                    # Another try of a call with wrong arguments fails as well.
+                    if isinstance(error, (ValueError, TypeError)):
+                        raise
+                    remaining_tries[k] -= 1
+                    if remaining_tries[k] == 0:
+                        problem = f"shard {k} of {len(folders)} failed {tries} times"
+                        if any(folder.is_dir() for folder in folders.values()):
+                            parts = folders[k].parent
+                            problem += f"; {parts} keeps the finished shards, and the same call plays the missing ones"
+                        raise RuntimeError(problem) from error
+                else:
+                    _unpack(data, folders[k])
+                    del remaining_tries[k]
+    except Exception:
+        for other in pending:
+            ray.cancel(other, force=True)
+        raise
+
+
+def _remove_unfinished(parts: Path) -> None:
+    """Removes incomplete shards, and the folder of the shards if it has no others."""
+    for folder in parts.glob("*.unfinished"):
+        shutil.rmtree(folder, ignore_errors=True)
+    # The folder of finished shards is not empty.
+    with suppress(OSError):
+        parts.rmdir()
+
+
 def evaluate(
     helper: Maker | Mapping[str, Maker] | None = None,
     *,
@@ -60,14 +103,16 @@ def evaluate(
     """Plays a benchmark as ``chaic.evaluate`` does, with its shards as Ray tasks of ``jobs`` cores each.
 
     ``shards`` defaults to four times the number of shards that the cluster plays in parallel. Finished shards stay in ``out``
-    + ``.shards``; a call after an interruption plays the missing ones. The run fails after ``tries`` failures of a shard,
-    which are exceptions and lost workers. The folder ``out`` equals that of a run on one machine, except for the order of
-    lines in results.jsonl. ``first`` and ``beside`` are deprecated names of ``n_episodes`` and ``baselines``.
+    + ``.shards`` until they are merged; a call after an interruption or a failure plays the missing ones. The run fails after
+    ``tries`` failures of a shard, which are exceptions and lost workers. ``quiet=False`` prints the report.
+
+    The folder ``out`` equals that of a run on one machine, except for the order of lines in results.jsonl. ``first`` and
+    ``beside`` are deprecated names of ``n_episodes`` and ``baselines``.
     """
     if baselines:
         options["baselines"] = baselines
     _deprecated.rename_keys(options, RENAMED_OPTIONS)
-    options.pop("quiet", None)
+    quiet = bool(options.pop("quiet", True))
     for name, number in [("shards", shards), ("jobs", jobs), ("tries", tries)]:
         if number is not None and number < 1:
             raise ValueError(f"{name} is {number}, expected at least 1")
@@ -84,30 +129,20 @@ def evaluate(
     if shards is None:
         cores = int(ray.cluster_resources().get("CPU", 1))
         shards = max(1, 4 * cores // jobs)
-    parts.mkdir(parents=True, exist_ok=True)
+    folders = {k: parts / f"{k}-of-{shards}" for k in range(1, shards + 1)}
     remote = ray.remote(num_cpus=jobs, max_retries=0)(_play)
-    remaining_tries = {k: tries for k in range(1, shards + 1) if not (parts / f"{k}-of-{shards}").is_dir()}
-    pending: dict[Any, int] = {}
-    while remaining_tries or pending:
-        for k in [k for k in remaining_tries if k not in pending.values()]:
-            pending[remote.remote(helper, f"{k}/{shards}", jobs, options)] = k
-        done, _ = ray.wait(list(pending), num_returns=1)
-        for reference in done:
-            k = pending.pop(reference)
-            try:
-                data = ray.get(reference)
-            except (ray.exceptions.RayError, OSError) as error:
-                # Another try of a call with wrong arguments fails as well.
-                if isinstance(error, (ValueError, TypeError)):
-                    raise
-                remaining_tries[k] -= 1
-                if remaining_tries[k] == 0:
-                    for other in pending:
-                        ray.cancel(other, force=True)
-                    raise RuntimeError(f"shard {k} of {shards} failed {tries} times") from error
-            else:
-                _unpack(data, parts / f"{k}-of-{shards}")
-                del remaining_tries[k]
-    run = merge(out, [parts / f"{k}-of-{shards}" for k in range(1, shards + 1)], quiet=True)
+
+    def start(shard: int) -> Any:
+        return remote.remote(helper, f"{shard}/{shards}", jobs, options)
+
+    parts.mkdir(parents=True, exist_ok=True)
+    try:
+        _play_missing(ray, start, folders, tries)
+    finally:
+        _remove_unfinished(parts)
+    try:
+        run = merge(out, list(folders.values()), quiet=quiet)
+    except (ValueError, RuntimeError) as error:
+        raise RuntimeError(f"{error}; {parts} keeps the finished shards: remove it to play them again") from error
     shutil.rmtree(parts)
     return run

@@ -72,7 +72,7 @@ def evaluate(
     helper: Maker | Mapping[str, Maker] | None = None,
     *,
     tasks: str | Sequence[str] | None = None,
-    split: str = "test",
+    split: str | None = None,
     n_episodes: int | None = None,
     seeds: int | None = None,
     baselines: str | Sequence[str] = (),
@@ -90,10 +90,11 @@ def evaluate(
 
     ``helper`` is a class (``Helper``), a ``functools.partial`` of one, or another callable that creates a helper for each
     episode, or several of them by name. All must request the same grants and images, as attributes of the callable.
-    ``n_episodes`` limits the episodes of each task. ``baselines`` names built-in helpers for comparison; EI needs
-    ``"none"``. ``jobs`` episodes run in parallel (default: one per core); their
-    Python helpers share the interpreter lock. Further options are those of ``chaic eval``: ``episodes``, ``rules``, ``set``,
-    ``traces``, ``perception``, ``behavior``, ``track``. ``track="hidden"`` refuses all grants except ``goal_place``.
+    ``split`` is ``"test"`` by default. ``n_episodes`` limits the episodes of each task. ``baselines`` names built-in
+    helpers for comparison; EI needs ``"none"``. ``jobs`` episodes run in parallel (default: one per core); their Python
+    helpers share the interpreter lock. Further options are those of ``chaic eval``: ``episodes`` (instead of ``split``),
+    ``rules``, ``set``, ``traces``, ``perception``, ``behavior``, ``track``. ``track="hidden"`` refuses all grants except
+    ``goal_place``.
     ``chaic report``, ``chaic verify`` and ``chaic replay`` read the folder.
 
     A helper that raises an exception scores zero for that episode, with the traceback in results.jsonl, and the run
@@ -109,6 +110,8 @@ def evaluate(
     ``KeyboardInterrupt`` stops the run; ``resume=True`` continues it. ``first`` and ``beside`` are deprecated names of
     ``n_episodes`` and ``baselines``.
     """
+    if jobs is not None and jobs < 1:
+        raise ValueError(f"jobs is {jobs}, expected at least 1")
     given = {"n_episodes": n_episodes, "baselines": _names(baselines) or None}
     options |= {name: value for name, value in given.items() if value is not None}
     _deprecated.rename_keys(options, RENAMED_OPTIONS)
@@ -127,7 +130,9 @@ def evaluate(
         raise ValueError("give a helper or baselines")
     if options.get("episodes") is not None:
         options["episodes"] = os.fspath(options["episodes"])
-    options |= {"split": split if options.get("episodes") is None else None, "seeds": seeds}
+    elif split is None:
+        split = "test"
+    options |= {"split": split, "seeds": seeds}
     if tasks is not None:
         options["tasks"] = task_names(tasks)
     read = [read] if isinstance(read, (str, os.PathLike)) else list(read)
@@ -153,7 +158,7 @@ def evaluate(
             granted=list(grants),
             images=list(images),
             image_size=image_size,
-            jobs=jobs or os.cpu_count() or 1,
+            jobs=(os.cpu_count() or 1) if jobs is None else jobs,
             resume=resume,
             shard=shard,
             isolation=isolation,

@@ -12,7 +12,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from chaic import _deprecated, spaces
-from chaic._chaic import ACTIONS, PROPRIOCEPTION, Batch, Episode
+from chaic._chaic import ACTIONS, PROPRIOCEPTION, Batch, Episode, World
 from chaic.episodes import EpisodeSource
 from chaic.gym import reward_weights
 
@@ -29,6 +29,8 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
     The final observation of an episode is that of the last decision. ``copy=False`` is faster: each step then overwrites the
     arrays of the last observation. ``out`` maps parts of the observation to arrays to write into: NumPy arrays, or objects
     with DLPack or the buffer protocol. ``copy`` is false by default with ``out``, and true without.
+
+    ``infos["kind_mask"]`` masks the kinds of action. A world that has ended keeps the mask of its last decision.
     """
 
     metadata = {"render_modes": ["rgb_array"], "autoreset_mode": AutoresetMode.NEXT_STEP}
@@ -78,10 +80,12 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
             "image_size": image_size,
             "grants": grants if isinstance(grants, str) else list(grants),
             "rules": rules,
-            "set": list(set),
+            "set": set if isinstance(set, str) else list(set),
             "appearance": appearance,
             "partner_image_size": partner_image_size,
         }
+        # Invalid options raise an error here, not in the first reset.
+        World(self.source.get(self.source.ids[0]), 0, **self._options)
         self._single = spaces.observation_space(self.parts, image_size)
         self._actions = spaces.primitive_space(image_size)
         self.single_observation_space = self._single

@@ -66,7 +66,7 @@ class _Pair:
             "image_size": image_size,
             "grants": grants if isinstance(grants, str) else list(grants),
             "rules": rules,
-            "set": list(set),
+            "set": set if isinstance(set, str) else list(set),
             "appearance": appearance,
         }
         self._world: World | None = None
@@ -102,9 +102,8 @@ class _Pair:
     def observation_space(self) -> gymnasium.spaces.Dict:
         return spaces.observation_space(self.parts, self.image_size)
 
-    def submit(self, agent: int, action: Any) -> None:
-        bounds = (len(ACTIONS), self.image_size, self.image_size)
-        self.world.submit(spaces.parse_row(action, bounds), agent)
+    def parse(self, action: Any) -> list[int]:
+        return spaces.parse_row(action, (len(ACTIONS), self.image_size, self.image_size))
 
     def reward(self, agent: int) -> float:
         terms = self.world.reward(agent)
@@ -259,7 +258,7 @@ class PairEnv(_PairBase, AECEnv[str, Obs, Any]):
                 self._advance()
                 self._accumulate_rewards()
             return
-        self._pair.submit(AGENTS.index(agent), action)
+        self.world.submit(self._pair.parse(action), AGENTS.index(agent))
         self._n_actions[agent] += 1
         self._cumulative_rewards[agent] = 0.0
         self._clear_rewards()
@@ -307,8 +306,10 @@ class PairParallelEnv(_PairBase, ParallelEnv[str, Obs, Any]):
         """Submits the actions of all agents and advances; actions of busy agents are ignored."""
         if not self.agents:
             return {}, {}, {}, {}, {}
-        for agent_id in self.world.waiting():
-            self._pair.submit(agent_id, actions[AGENTS[agent_id]])
+        # All actions are checked before the first is submitted, so an invalid one changes nothing.
+        rows = [(agent_id, self._pair.parse(actions[AGENTS[agent_id]])) for agent_id in self.world.waiting()]
+        for agent_id, row in rows:
+            self.world.submit(row, agent_id)
         waiting = self._advance()
         self._steps += 1
         ended = not waiting

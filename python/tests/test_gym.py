@@ -79,6 +79,38 @@ def test_invalid_arguments_are_refused():
         gymnasium.make(IDS["obstacle"], reward={"fame": 1.0})
 
 
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"image_size": 0},
+        {"grants": "gold"},
+        {"rules": "papr"},
+        {"set": "nothing=1"},
+        {"appearance": "sepia"},
+        {"partner_image_size": 5},
+    ],
+)
+def test_all_environments_refuse_invalid_options_at_construction(options):
+    messages = set()
+    for create in (HelperEnv, HelperVectorEnv):
+        with pytest.raises(ValueError) as raised:
+            create("obstacle", **options)
+        messages.add(str(raised.value))
+    assert len(messages) == 1
+
+
+def test_one_setting_may_be_a_string():
+    for create in (HelperEnv, HelperVectorEnv):
+        create("obstacle", observation="proprioception", set="world.stride_m=0.3")
+        with pytest.raises(ValueError, match="no rule `nothing`"):
+            create("obstacle", observation="proprioception", set="nothing=1")
+
+
+def test_perception_without_planner_is_refused():
+    with pytest.raises(ValueError, match="perception applies to"):
+        HelperEnv("obstacle", perception="learned")
+
+
 def test_old_names_of_options_warn():
     with pytest.warns(DeprecationWarning, match="progress_per_m"):
         weights = reward_weights({"approached_per_m": 2.0})
@@ -135,6 +167,7 @@ def test_episodes_restart_in_each_autoreset_mode(mode):
     else:
         pytest.fail("no episode ended")
     ended = terminated | truncated
+    assert infos["kind_mask"].any(axis=1).all(), "a policy can sample in all worlds"
     if mode == "Disabled":
         with pytest.raises(gymnasium.error.ResetNeeded):
             vector.step(wait)

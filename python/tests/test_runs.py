@@ -2,8 +2,10 @@
 
 import html
 import json
+import sys
 import time
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -159,6 +161,50 @@ def test_numbers_of_a_run_on_ray_are_checked(tmp_path):
             chaic.ray.evaluate(Turner, out=tmp_path / "run", **{number: 0})
 
 
+class LocalRay:
+    """Runs the tasks of Ray in this process."""
+
+    exceptions = SimpleNamespace(RayError=RuntimeError)
+
+    def is_initialized(self):
+        return True
+
+    def remote(self, **_):
+        return lambda function: SimpleNamespace(remote=lambda *arguments: partial(function, *arguments))
+
+    def wait(self, references, num_returns):
+        return references[:num_returns], references[num_returns:]
+
+    def get(self, reference):
+        return reference()
+
+    def cancel(self, reference, force):
+        pass
+
+
+def test_shards_stay_after_a_failure_and_go_after_the_merge(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "ray", LocalRay())
+    play = chaic.ray._play
+
+    def lose_second(helper, shard, jobs, options):
+        if shard == "2/2":
+            raise OSError("the worker is lost")
+        return play(helper, shard, jobs, options)
+
+    options = {"baselines": "none", "tasks": "low_target", "split": "train", "n_episodes": 2, "shards": 2, "tries": 1}
+    shards = tmp_path / "run.shards"
+    with monkeypatch.context() as patched:
+        patched.setattr(chaic.ray, "_play", lose_second)
+        with pytest.raises(RuntimeError, match=r"shard 2 of 2 failed 1 times; .*run\.shards keeps the finished shards"):
+            chaic.ray.evaluate(out=tmp_path / "run", **options)
+    assert [folder.name for folder in shards.iterdir()] == ["1-of-2"]
+    run = chaic.ray.evaluate(out=tmp_path / "run", **options)
+    assert len(run.results()) == 2 and not shards.exists()
+    with pytest.raises(ValueError):
+        chaic.ray.evaluate(out=tmp_path / "other", rules="papr", **options)
+    assert not (tmp_path / "other.shards").exists(), "no shard was played"
+
+
 def test_an_interrupted_run_can_be_resumed(tmp_path):
     class Interrupts(Turner):
         def act(self, observation):
@@ -181,6 +227,9 @@ def test_invalid_arguments_are_refused(tmp_path):
         (ValueError, lambda: chaic.evaluate(Turner, out=out, **{**OPTIONS, "tasks": "flying"})),
         (ValueError, lambda: chaic.evaluate(Turner, out=out, track="open", **OPTIONS)),
         (ValueError, lambda: chaic.evaluate(Turner, out=out, rules="papr", **OPTIONS)),
+        (ValueError, lambda: chaic.evaluate(Turner, out=out, set="nothing=1", **OPTIONS)),
+        (ValueError, lambda: chaic.evaluate(Turner, out=out, episodes=tmp_path, **OPTIONS)),
+        (ValueError, lambda: chaic.evaluate(Turner, out=out, **{**OPTIONS, "jobs": 0})),
         (ValueError, lambda: chaic.evaluate(Turner, out=out, baselines=["rpp"], **OPTIONS)),
         (TypeError, lambda: chaic.evaluate(Turner, out=out, colour="red", **OPTIONS)),
         (FileNotFoundError, lambda: chaic.Run(tmp_path / "nothing")),

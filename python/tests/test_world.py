@@ -293,6 +293,23 @@ def test_batch_arrays_have_the_shape_of_the_images(episode):
             batch.observe(**arrays)
 
 
+def test_read_only_arrays_and_shared_memory_raise_errors(episode):
+    batch = chaic.Batch([episode], [0], images=["rgb", "depth"], image_size=16)
+    batch.advance()
+    memory = np.zeros(4 * 16 * 16, np.float32)
+    depth, rgb = memory.reshape(4, 16, 16)[:1], memory.view(np.uint8)[: 3 * 16 * 16].reshape(1, 16, 16, 3)
+    with pytest.raises(RuntimeError, match="memory of the array"):
+        batch.observe(rgb=rgb, depth=depth)
+    rgb = rgb.copy()
+    rgb.flags.writeable = False
+    with pytest.raises(ValueError, match="rgb is read-only"):
+        batch.advance_and_observe(rgb=rgb, depth=depth)
+    values, mask = np.zeros((1, 12), np.float32), np.zeros((1, 11), bool)
+    mask.flags.writeable = False
+    with pytest.raises(ValueError, match="mask is read-only"):
+        batch.proprioception(values, mask)
+
+
 def test_a_view_is_that_of_the_helper_or_of_a_camera(episode):
     world = waiting(episode)
     assert (world.render()["rgb"] == world.render(1)["rgb"]).all()
@@ -300,6 +317,11 @@ def test_a_view_is_that_of_the_helper_or_of_a_camera(episode):
     camera = world.observe().camera
     with pytest.raises(ValueError, match="agent or a camera"):
         world.render(0, camera=camera)
+    with pytest.raises(ValueError, match="own width and height"):
+        world.render(camera=camera, image_size=64)
+    with pytest.raises(ValueError, match="agent is -1"):
+        world.render(-1)
+    assert list(world.render(images="depth")) == ["depth"]
     alone = chaic.World(episode, helper="none")
     assert (alone.render()["rgb"] == alone.render(0)["rgb"]).all()
     assert alone.render(camera=camera)["rgb"].any()
@@ -357,3 +379,15 @@ def test_one_grant_may_be_a_string(episode):
     assert world.briefing().grants["ids"]
     with pytest.raises(ValueError, match='unknown grant "idz"'):
         chaic.World(episode, grants="idz")
+
+
+def test_one_setting_may_be_a_string(episode):
+    for create in (
+        lambda setting: chaic.World(episode, set=setting),
+        lambda setting: chaic.Batch([episode], [0], set=setting),
+        lambda setting: chaic.PlanningAgent("rhp", set=setting),
+        lambda setting: chaic.Planner(set=setting),
+    ):
+        create("world.stride_m=0.3")
+        with pytest.raises(ValueError, match="no rule `nothing`"):
+            create("nothing=1")

@@ -100,6 +100,15 @@ def test_a_busy_agent_needs_no_action():
         assert infos["helper"]["asked"] == infos["helper"]["needs_action"]
 
 
+def test_an_invalid_action_submits_none_of_the_others():
+    env = zoo.parallel_env("obstacle", **OPTIONS)
+    env.reset(seed=0)
+    assert env.world.waiting() == [0, 1]
+    with pytest.raises(ValueError, match="invalid action"):
+        env.step({"partner": np.array([0, 0, 0]), "helper": np.array([99, 0, 0])})
+    assert env.world.waiting() == [0, 1]
+
+
 def test_invalid_arguments_are_refused():
     env = zoo.env("obstacle", **OPTIONS)
     env.reset(seed=0)
@@ -107,5 +116,7 @@ def test_invalid_arguments_are_refused():
         env.step(np.array([99, 0, 0]))
     with pytest.raises(ValueError):
         zoo.env("obstacle", observation="map")
+    with pytest.raises(ValueError, match="no rule `nothing`"):
+        zoo.env("obstacle", set="nothing=1", **OPTIONS)
     with pytest.raises(ValueError, match="rgb_array"):
         zoo.parallel_env("obstacle", render_mode="human")

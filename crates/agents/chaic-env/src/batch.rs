@@ -246,6 +246,32 @@ impl EnvBatch {
         let Some(SlotId { env, agent }) = self.slots.get(slot).copied() else { return false };
         self.envs[env].submit(agent, action)
     }
+
+    /// Sets the next actions of some slots, on all cores. Of two actions for one slot the first counts.
+    ///
+    /// Equal to [`submit`](EnvBatch::submit) of each slot in order. Faster if pixels need a rendered view.
+    /// Returns whether each action was set.
+    pub fn submit_many(&mut self, actions: &[(usize, Action)]) -> Vec<bool> {
+        let mut by_env: Vec<Vec<(usize, AgentId, Action)>> = vec![Vec::new(); self.envs.len()];
+        for (k, (slot, action)) in actions.iter().enumerate() {
+            if let Some(SlotId { env, agent }) = self.slots.get(*slot).copied() {
+                by_env[env].push((k, agent, *action));
+            }
+        }
+        let submit = |(env, chosen): (&mut Env, Vec<(usize, AgentId, Action)>)| {
+            let mut accepted = Vec::new();
+            for (k, agent, action) in chosen {
+                if env.submit(agent, action) {
+                    accepted.push(k);
+                }
+            }
+            accepted
+        };
+        let accepted: Vec<Vec<usize>> = self.envs.par_iter_mut().zip(by_env).map(submit).collect();
+        let mut is_set = vec![false; actions.len()];
+        accepted.into_iter().flatten().for_each(|k| is_set[k] = true);
+        is_set
+    }
 }
 
 /// An environment with its slots and their parts of the buffers.

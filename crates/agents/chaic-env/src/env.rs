@@ -1,23 +1,23 @@
 //! Episode environment: a world, its agents and the loop between them.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use chaic_core::agent::{ChildState, Thought};
-use chaic_core::observation::{HistoryFrame, Images};
+use chaic_core::observation::Images;
 use chaic_core::{Action, AgentError, AgentId, Briefing, Frame, Observation, Target};
 use chaic_render::{ImagesMut, Scene};
 use chaic_world::{Setup, World};
 
-use crate::agent_slot::{AgentSlot, Driver, EpisodeAgents, agent_slots};
+use crate::agent_slot::{AgentSlot, EpisodeAgents, agent_slots};
 use crate::config::EpisodeConfig;
 use crate::digest::Digest;
 use crate::error::{EnvError, Result};
-use crate::observer::{ObservationRenderer, RenderedObservation, resolve_unseen};
-use crate::reward::{RewardTerms, RewardTracker};
+use crate::observer::{ObservationRenderer, resolve_unseen};
+use crate::reward::RewardTerms;
 use crate::step::{self, ChosenAction, submit_all};
 use crate::trace::{End, Header, Record};
+use crate::turn::{Turn, choose};
 
 /// Reason why [`Env::run`] returned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,6 +55,7 @@ pub struct EnvSnapshot {
     turns: Vec<Turn>,
     header: Header,
     supplied: SuppliedSlots,
+    failure: Option<AgentError>,
     has_recorded_end: bool,
 }
 
@@ -63,65 +64,6 @@ pub struct EnvSnapshot {
 enum SuppliedSlots {
     Some { helper: bool, partner: bool },
     All,
-}
-
-/// State of an agent between two actions, and data that it keeps during the episode.
-#[derive(Clone)]
-struct Turn {
-    /// True if the agent's action has ended and the next one has not begun.
-    is_open: bool,
-    /// Observation of this turn, once it is rendered.
-    rendered: Option<RenderedObservation>,
-    /// Next action.
-    choice: Option<ChosenAction>,
-    /// Thought and child state as last recorded.
-    recorded: RecordedState,
-    /// Reward state, for external agents.
-    rewards: RewardTracker,
-    /// Images since the last decision, oldest first.
-    frame_history: VecDeque<HistoryFrame>,
-    /// Id buffer for reuse.
-    spare_ids: Vec<u16>,
-}
-
-impl Turn {
-    fn new(agent: AgentId) -> Turn {
-        Turn {
-            is_open: false,
-            rendered: None,
-            choice: None,
-            recorded: RecordedState::default(),
-            rewards: RewardTracker::new(agent),
-            frame_history: VecDeque::new(),
-            spare_ids: Vec::new(),
-        }
-    }
-
-    /// Ends the turn and returns the agent's next action.
-    fn close(&mut self) -> Option<ChosenAction> {
-        self.is_open = false;
-        if let Some(ids) = self.rendered.take().and_then(|rendered| rendered.hidden_ids) {
-            self.spare_ids = ids;
-        }
-        // The agent may have decided without an observation.
-        self.frame_history.clear();
-        self.choice.take()
-    }
-
-    /// Discards the rendered observation, but not its frame history; its images may lie in buffers of
-    /// a caller that have changed since.
-    fn discard_images(&mut self) {
-        if let Some(rendered) = self.rendered.take() {
-            self.frame_history = rendered.observation.frame_history.into();
-        }
-    }
-}
-
-/// State that an agent reports for the trace.
-#[derive(Clone, Default, PartialEq)]
-struct RecordedState {
-    thought: Option<Thought>,
-    child: Option<ChildState>,
 }
 
 impl Env {
@@ -359,7 +301,7 @@ impl Env {
         Digest(self.world.digest())
     }
 
-    /// Copies the episode with its agents.
+    /// Copies the episode with its agents. A copy that is made after an agent failed keeps the failure.
     ///
     /// # Errors
     /// [`EnvError::NoFork`] if an agent can't be copied, such as one in another process or one that
@@ -371,6 +313,7 @@ impl Env {
             turns: self.turns.clone(),
             header: self.header.clone(),
             supplied: self.supplied,
+            failure: self.failure.clone(),
             has_recorded_end: self.has_recorded_end,
         })
     }
@@ -398,7 +341,7 @@ impl Env {
         self.has_recorded_end = snapshot.has_recorded_end;
         self.turns.clone_from(&snapshot.turns);
         self.turns.iter_mut().for_each(Turn::discard_images);
-        self.failure = check_sensors(&self.slots);
+        self.failure.clone_from(&snapshot.failure);
         Ok(())
     }
 
@@ -499,7 +442,10 @@ impl Env {
             return Ok(false);
         }
         let choices = waiting.iter().filter_map(|a| self.turns[a.index()].close()).collect();
-        submit_all(&mut self.world, choices, sink)?;
+        for agent in submit_all(&mut self.world, choices, sink)? {
+            // The trace lacks its thought, so the next decision records one in any case.
+            self.turns[agent.index()].recorded.thought = None;
+        }
         Ok(true)
     }
 
@@ -578,22 +524,4 @@ fn fork(slots: &[AgentSlot]) -> Result<Vec<AgentSlot>> {
         slot.fork().ok_or(EnvError::NoFork { agent })
     };
     slots.iter().enumerate().map(fork).collect()
-}
-
-/// Asks the agent of a slot for its next action; `None` if the caller controls it.
-fn choose(
-    slot: &mut AgentSlot,
-    id: AgentId,
-    rendered: &RenderedObservation,
-    recorded: &mut RecordedState,
-) -> std::result::Result<Option<ChosenAction>, AgentError> {
-    let Driver::Agent(agent) = &mut slot.driver else { return Ok(None) };
-    let chosen = agent.act(&rendered.observation)?;
-    let action = rendered.resolve(chosen);
-    slot.submitted = Some((chosen, action));
-    let state = RecordedState { thought: Some(agent.thought()), child: agent.child_state() };
-    let thought = state.thought.clone().filter(|_| state.thought != recorded.thought);
-    let child = state.child.filter(|_| state.child != recorded.child);
-    *recorded = state;
-    Ok(Some(ChosenAction { agent: id, action, thought, child }))
 }

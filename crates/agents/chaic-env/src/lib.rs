@@ -66,6 +66,7 @@ pub mod rules;
 mod step;
 pub mod trace;
 mod track;
+mod turn;
 
 pub use agent_slot::{AgentSlot, Driver, EpisodeAgents, NoopAgent, agent_slots, world_seed};
 pub use batch::{EnvBatch, ImageLayout, SlotId};

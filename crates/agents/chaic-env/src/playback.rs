@@ -158,7 +158,7 @@ impl<T: Deref<Target = Trace>> Playback<T> {
             records.push(record.clone());
             Ok::<(), Infallible>(())
         };
-        let Ok(()) = submit_all(&mut self.world, choices, &mut sink);
+        let Ok(_) = submit_all(&mut self.world, choices, &mut sink);
         self.world.advance();
         let Ok(()) = record_events(&mut self.world, &mut sink);
         Some(records)

@@ -23,26 +23,32 @@ pub(crate) struct ChosenAction {
 
 /// Submits the actions that agents chose in one frame, in order, and passes the records to `sink`.
 ///
+/// Drops the action of an agent that an earlier one engaged. Returns the agents of dropped actions whose
+/// thought had changed.
+///
 /// # Errors
 /// Those of `sink`.
 pub(crate) fn submit_all<E>(
     world: &mut World,
     choices: Vec<ChosenAction>,
     sink: &mut dyn FnMut(&Record) -> Result<(), E>,
-) -> Result<(), E> {
+) -> Result<Vec<AgentId>, E> {
     let frame = world.state().frame;
+    let mut without_thought = Vec::new();
     for ChosenAction { agent, action, thought, child } in choices {
         // An earlier action of this frame may have engaged this agent already.
         if world.waiting().contains(&agent) {
             let digest = Digest(world.digest());
             sink(&Record::Decision(Decision { frame, agent, action, digest, thought }))?;
             world.submit(agent, action).expect("the agent waits");
+        } else if thought.is_some() {
+            without_thought.push(agent);
         }
         if let Some(state) = child {
             sink(&Record::Child(ChildRecord { frame, state }))?;
         }
     }
-    Ok(())
+    Ok(without_thought)
 }
 
 /// Passes the recorded events since the last call to `sink`.

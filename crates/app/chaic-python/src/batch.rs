@@ -6,8 +6,7 @@ use std::sync::{Arc, Mutex};
 use chaic_core::{AgentError, AgentId};
 use chaic_env::{AdvanceOutcome, Env, EnvBatch, EpisodeConfig, ImageLayout, ImagesMut, SlotId};
 use numpy::{
-    Element, PyArray1, PyReadonlyArray2, PyReadwriteArray2, PyReadwriteArrayDyn,
-    PyUntypedArrayMethods as _,
+    Element, PyArray1, PyArray2, PyArrayDyn, PyReadwriteArrayDyn, PyUntypedArrayMethods as _,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -15,7 +14,9 @@ use rayon::prelude::*;
 
 use crate::action;
 use crate::episode::Episode;
-use crate::error::{failure, from_env, mistake, no_attribute, no_such, poisoned};
+use crate::error::{
+    failure, from_env, mistake, no_attribute, no_such, poisoned, readable, writable,
+};
 use crate::observation::Briefing;
 use crate::options::Options;
 use crate::reward::parse_weights;
@@ -47,7 +48,20 @@ struct ImageArrays<'py> {
     ids: Option<PyReadwriteArrayDyn<'py, u16>>,
 }
 
-impl ImageArrays<'_> {
+impl<'py> ImageArrays<'py> {
+    /// Borrows the given arrays.
+    fn new(
+        rgb: Option<&Bound<'py, PyArrayDyn<u8>>>,
+        depth: Option<&Bound<'py, PyArrayDyn<f32>>>,
+        ids: Option<&Bound<'py, PyArrayDyn<u16>>>,
+    ) -> PyResult<ImageArrays<'py>> {
+        Ok(ImageArrays {
+            rgb: rgb.map(|array| writable("rgb", array)).transpose()?,
+            depth: depth.map(|array| writable("depth", array)).transpose()?,
+            ids: ids.map(|array| writable("ids", array)).transpose()?,
+        })
+    }
+
     /// Returns the arrays as slices, after a check of their shapes.
     fn images(&mut self, layout: ImageLayout) -> PyResult<ImagesMut<'_>> {
         let (n, side) = (layout.slots, layout.size as usize);
@@ -175,11 +189,11 @@ impl Batch {
     fn advance_and_observe<'py>(
         &mut self,
         py: Python<'py>,
-        rgb: Option<PyReadwriteArrayDyn<'_, u8>>,
-        depth: Option<PyReadwriteArrayDyn<'_, f32>>,
-        ids: Option<PyReadwriteArrayDyn<'_, u16>>,
+        rgb: Option<&Bound<'py, PyArrayDyn<u8>>>,
+        depth: Option<&Bound<'py, PyArrayDyn<f32>>>,
+        ids: Option<&Bound<'py, PyArrayDyn<u16>>>,
     ) -> PyResult<Bound<'py, PyArray1<u8>>> {
-        let mut arrays = ImageArrays { rgb, depth, ids };
+        let mut arrays = ImageArrays::new(rgb, depth, ids)?;
         let envs = self.envs()?;
         let images = arrays.images(envs.layout())?;
         let outcomes = detached(py, || envs.advance_and_observe(None, images))?;
@@ -190,14 +204,14 @@ impl Batch {
     /// 3]), depth (float32 meters [slots, size, size]) and ids (uint16 [slots, size, size]). Returns these slots;
     /// the arrays of other slots do not change.
     #[pyo3(signature = (rgb=None, depth=None, ids=None))]
-    fn observe(
+    fn observe<'py>(
         &mut self,
-        py: Python<'_>,
-        rgb: Option<PyReadwriteArrayDyn<'_, u8>>,
-        depth: Option<PyReadwriteArrayDyn<'_, f32>>,
-        ids: Option<PyReadwriteArrayDyn<'_, u16>>,
+        py: Python<'py>,
+        rgb: Option<&Bound<'py, PyArrayDyn<u8>>>,
+        depth: Option<&Bound<'py, PyArrayDyn<f32>>>,
+        ids: Option<&Bound<'py, PyArrayDyn<u16>>>,
     ) -> PyResult<Vec<usize>> {
-        let mut arrays = ImageArrays { rgb, depth, ids };
+        let mut arrays = ImageArrays::new(rgb, depth, ids)?;
         let envs = self.envs()?;
         let images = arrays.images(envs.layout())?;
         detached(py, || envs.observe(images))?.map_err(|error| from_env(&error))
@@ -207,9 +221,10 @@ impl Batch {
     /// (bool [slots, 11]) of all observed slots.
     fn proprioception(
         &mut self,
-        mut values: PyReadwriteArray2<'_, f32>,
-        mut mask: PyReadwriteArray2<'_, bool>,
+        values: &Bound<'_, PyArray2<f32>>,
+        mask: &Bound<'_, PyArray2<bool>>,
     ) -> PyResult<()> {
+        let (mut values, mut mask) = (writable("values", values)?, writable("mask", mask)?);
         let envs = self.envs()?;
         let n = envs.slots().len();
         let (mut values, mut mask) = (values.as_array_mut(), mask.as_array_mut());
@@ -233,7 +248,8 @@ impl Batch {
 
     /// Sets the next actions of all slots that need one: int64 [slots, 3], rows of kind (`ACTIONS`), column and row
     /// of a pixel. Rows of other slots are ignored.
-    fn submit(&mut self, py: Python<'_>, actions: PyReadonlyArray2<'_, i64>) -> PyResult<()> {
+    fn submit(&mut self, py: Python<'_>, actions: &Bound<'_, PyArray2<i64>>) -> PyResult<()> {
+        let actions = readable("actions", actions)?;
         let envs = self.envs()?;
         let n = envs.slots().len();
         let actions = actions.as_array();
@@ -253,9 +269,7 @@ impl Batch {
         }
         // The pixel of an action without an image needs a rendered view.
         detached(py, || {
-            for (k, action) in submitted {
-                envs.submit(k, action);
-            }
+            envs.submit_many(&submitted);
         })
     }
 
@@ -284,14 +298,14 @@ impl Batch {
     }
 
     /// Returns the delivered and the wanted amount of each world, float64 [worlds, 2]; TR is their ratio.
-    fn progress<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, numpy::PyArray2<f64>>> {
+    fn progress<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let envs = self.envs()?;
         let row = |env: &Env| {
             let (done, total) = env.world().progress();
             vec![done, total]
         };
         let rows: Vec<Vec<f64>> = envs.envs().iter().map(row).collect();
-        numpy::PyArray2::from_vec2(py, &rows).map_err(failure)
+        PyArray2::from_vec2(py, &rows).map_err(failure)
     }
 
     /// Returns the score of a world so far, as `World.score`.

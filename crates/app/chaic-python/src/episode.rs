@@ -9,13 +9,11 @@ use chaic_episodes::{Split, find_episode};
 use chaic_render::floor_plan;
 use chaic_world::{SetupError, World};
 use image::{ImageFormat, RgbImage};
-use numpy::{
-    PyArray1, PyArray3, PyArrayMethods as _, PyReadonlyArray3, PyUntypedArrayMethods as _,
-};
+use numpy::{PyArray1, PyArray3, PyArrayMethods as _, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
-use crate::error::{failure, mistake, no_attribute};
+use crate::error::{failure, mistake, no_attribute, readable};
 
 /// An episode: a scene, its objects and people, and the partner's goal.
 #[pyclass(frozen, module = "chaic._chaic", skip_from_py_object)]
@@ -97,7 +95,7 @@ impl Episode {
 
     /// Returns the picture for notebooks, as PNG.
     fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        encode_png(py, self.floor_plan(py, 640)?.readonly())
+        encode_png(py, &self.floor_plan(py, 640)?)
     }
 
     fn __repr__(&self) -> String {
@@ -114,8 +112,9 @@ impl Episode {
 #[pyfunction]
 pub fn encode_png<'py>(
     py: Python<'py>,
-    rgb: PyReadonlyArray3<'py, u8>,
+    rgb: &Bound<'py, PyArray3<u8>>,
 ) -> PyResult<Bound<'py, PyBytes>> {
+    let rgb = readable("rgb", rgb)?;
     let &[height, width, 3] = rgb.shape() else {
         return Err(mistake("expected a picture of shape (height, width, 3)"));
     };

@@ -3,6 +3,10 @@
 use std::fmt::Display;
 
 use chaic_env::EnvError;
+use numpy::ndarray::Dimension;
+use numpy::{
+    BorrowError, Element, PyArray, PyArrayMethods as _, PyReadonlyArray, PyReadwriteArray,
+};
 use pyo3::exceptions::{
     PyAttributeError, PyIndexError, PyOverflowError, PyRuntimeError, PyValueError,
 };
@@ -69,6 +73,35 @@ pub fn from_env(error: &EnvError) -> PyErr {
 /// Returns a `RuntimeError` for an object in which a call panicked.
 pub fn poisoned<T>(_: T) -> PyErr {
     failure("an earlier call panicked; create a new object")
+}
+
+/// Borrows an array of the caller for reading; `name` names it in the error.
+///
+/// # Errors
+/// `RuntimeError` if another call writes to its memory.
+pub fn readable<'py, T: Element, D: Dimension>(
+    name: &str,
+    array: &Bound<'py, PyArray<T, D>>,
+) -> PyResult<PyReadonlyArray<'py, T, D>> {
+    array.try_readonly().map_err(|problem| not_borrowed(name, &problem))
+}
+
+/// Borrows an array of the caller for writing; `name` names it in the error.
+///
+/// # Errors
+/// `ValueError` if it is read-only, `RuntimeError` if another argument or call uses its memory.
+pub fn writable<'py, T: Element, D: Dimension>(
+    name: &str,
+    array: &Bound<'py, PyArray<T, D>>,
+) -> PyResult<PyReadwriteArray<'py, T, D>> {
+    array.try_readwrite().map_err(|problem| not_borrowed(name, &problem))
+}
+
+fn not_borrowed(name: &str, problem: &BorrowError) -> PyErr {
+    match problem {
+        BorrowError::NotWriteable => mistake(format!("the array {name} is read-only")),
+        _ => failure(format!("another argument or thread uses the memory of the array {name} now")),
+    }
 }
 
 /// Returns the start of the `repr` of an object.

@@ -28,7 +28,7 @@ use serde::Deserialize;
 use crate::agent::{PyAgent, agent_error};
 use crate::error::{failure, mistake};
 use crate::isolated::{IsolatedHelper, IsolationOptions};
-use crate::options::{grants, perception, sensors};
+use crate::options::{Names, grants, perception, sensors};
 use crate::threads::refuse_fork;
 
 /// Registry of Python helpers and built-in ones.
@@ -119,7 +119,7 @@ struct Keywords {
     n_episodes: Option<u32>,
     seeds: Option<u32>,
     rules: Option<String>,
-    set: Vec<String>,
+    set: Names,
     traces: Option<bool>,
     perception: Option<String>,
     behavior: Option<String>,
@@ -143,7 +143,7 @@ impl Keywords {
             n_episodes: self.n_episodes,
             seeds: self.seeds,
             rules: self.rules.map(|name| name.parse().map_err(mistake)).transpose()?,
-            rule_overrides: self.set,
+            rule_overrides: self.set.into_vec(),
             no_traces: self.traces == Some(false),
             perception: self.perception.filter(|name| name != GROUND_TRUTH),
             behavior: self.behavior.filter(|name| name != GROUND_TRUTH),

@@ -53,18 +53,42 @@ pub type Depth<'py> = Bound<'py, PyArray2<f32>>;
 /// Instance ids, uint16 [height, width].
 pub type Ids<'py> = Bound<'py, PyArray2<u16>>;
 
+/// Returns the shape of a camera's images.
+fn shape(camera: &Camera) -> [usize; 2] {
+    [camera.height as usize, camera.width as usize]
+}
+
+/// Converts a color image to an array.
+fn rgb_array<'py>(py: Python<'py>, images: &Images, camera: &Camera) -> PyResult<Option<Rgb<'py>>> {
+    let [height, width] = shape(camera);
+    let array = |rgb| PyArray1::from_slice(py, rgb).reshape([height, width, 3]);
+    images.rgb.as_deref().map(array).transpose()
+}
+
+/// Converts a depth image to an array.
+fn depth_array<'py>(
+    py: Python<'py>,
+    images: &Images,
+    camera: &Camera,
+) -> PyResult<Option<Depth<'py>>> {
+    let array = |depth_m| PyArray1::from_slice(py, depth_m).reshape(shape(camera));
+    images.depth_m.as_deref().map(array).transpose()
+}
+
+/// Converts an image of instance ids to an array.
+fn ids_array<'py>(py: Python<'py>, images: &Images, camera: &Camera) -> PyResult<Option<Ids<'py>>> {
+    let array = |ids| PyArray1::from_slice(py, ids).reshape(shape(camera));
+    images.ids.as_deref().map(array).transpose()
+}
+
 /// Converts images to arrays.
 pub fn arrays<'py>(
     py: Python<'py>,
     images: &Images,
     camera: &Camera,
 ) -> PyResult<(Option<Rgb<'py>>, Option<Depth<'py>>, Option<Ids<'py>>)> {
-    let shape = [camera.height as usize, camera.width as usize];
-    let rgb_shape = [shape[0], shape[1], 3];
-    let rgb = images.rgb.as_ref().map(|rgb| PyArray1::from_slice(py, rgb).reshape(rgb_shape));
-    let depth = images.depth_m.as_ref().map(|m| PyArray1::from_slice(py, m).reshape(shape));
-    let ids = images.ids.as_ref().map(|ids| PyArray1::from_slice(py, ids).reshape(shape));
-    Ok((rgb.transpose()?, depth.transpose()?, ids.transpose()?))
+    let (rgb, depth) = (rgb_array(py, images, camera)?, depth_array(py, images, camera)?);
+    Ok((rgb, depth, ids_array(py, images, camera)?))
 }
 
 #[pymethods]
@@ -96,19 +120,19 @@ impl Observation {
     /// Color, uint8 [height, width, 3]; `None` if not requested.
     #[getter]
     fn rgb<'py>(&self, py: Python<'py>) -> PyResult<Option<Rgb<'py>>> {
-        Ok(arrays(py, &self.0.images, &self.0.camera)?.0)
+        rgb_array(py, &self.0.images, &self.0.camera)
     }
 
     /// Depth along the camera's axis, float32 meters [height, width]; `None` if not requested.
     #[getter]
     fn depth<'py>(&self, py: Python<'py>) -> PyResult<Option<Depth<'py>>> {
-        Ok(arrays(py, &self.0.images, &self.0.camera)?.1)
+        depth_array(py, &self.0.images, &self.0.camera)
     }
 
     /// Instance ids, uint16 [height, width]; `None` if not requested or not granted.
     #[getter]
     fn ids<'py>(&self, py: Python<'py>) -> PyResult<Option<Ids<'py>>> {
-        Ok(arrays(py, &self.0.images, &self.0.camera)?.2)
+        ids_array(py, &self.0.images, &self.0.camera)
     }
 
     /// Images since the last decision, oldest first, if requested: dictionaries with `frame`, `camera`, `rgb`
@@ -117,7 +141,8 @@ impl Observation {
     fn frame_history<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let frames = PyList::empty(py);
         for history in &self.0.frame_history {
-            let (rgb, depth, _) = arrays(py, &history.images, &history.camera)?;
+            let rgb = rgb_array(py, &history.images, &history.camera)?;
+            let depth = depth_array(py, &history.images, &history.camera)?;
             let frame = pyo3::types::PyDict::new(py);
             frame.set_item("frame", history.frame)?;
             frame.set_item("camera", plain(py, &history.camera)?)?;

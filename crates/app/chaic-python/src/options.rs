@@ -28,7 +28,7 @@ struct Keywords {
     helper: String,
     partner: String,
     rules: String,
-    set: Vec<String>,
+    set: Names,
     grants: Names,
     images: Names,
     image_size: u32,
@@ -39,16 +39,23 @@ struct Keywords {
     behavior: String,
 }
 
-/// One name, or several of them.
+/// One string (a name or a setting), or several of them.
 #[derive(Deserialize)]
-#[serde(untagged, expecting = "expected a name or a list of names")]
-enum Names {
+#[serde(untagged, expecting = "expected a string or a list of strings")]
+pub enum Names {
     One(String),
     Several(Vec<String>),
 }
 
+impl Default for Names {
+    fn default() -> Names {
+        Names::Several(Vec::new())
+    }
+}
+
 impl Names {
-    fn into_vec(self) -> Vec<String> {
+    /// Returns all strings.
+    pub fn into_vec(self) -> Vec<String> {
         match self {
             Names::One(name) => vec![name],
             Names::Several(names) => names,
@@ -62,8 +69,8 @@ impl Default for Keywords {
             helper: CALLER.to_owned(),
             partner: helper_registry::RULES.to_owned(),
             rules: RuleSetName::Paper.to_string(),
-            set: Vec::new(),
-            grants: Names::Several(Vec::new()),
+            set: Names::default(),
+            grants: Names::default(),
             images: Names::Several(vec!["rgb".to_owned(), "depth".to_owned()]),
             image_size: 128,
             partner_image_size: None,
@@ -98,7 +105,7 @@ impl Options {
         let keywords: Keywords =
             keywords.map(|k| depythonize(k).map_err(wrong)).transpose()?.unwrap_or_default();
         let options = Options {
-            rules: rule_set(&keywords.rules, &keywords.set)?,
+            rules: rule_set(&keywords.rules, &keywords.set.into_vec())?,
             sensors: sensors(&keywords.images.into_vec(), keywords.image_size)?,
             grants: grants(&keywords.grants.into_vec())?,
             appearance: keywords.appearance.parse().map_err(mistake)?,
@@ -159,6 +166,17 @@ impl Options {
             }
         };
         Ok(EpisodeAgents { helper, partner })
+    }
+}
+
+/// Extracts one string, or several of them.
+///
+/// # Errors
+/// `TypeError` for other values.
+pub fn strings(value: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {
+    match value.extract::<String>() {
+        Ok(string) => Ok(vec![string]),
+        Err(_) => value.extract(),
     }
 }
 

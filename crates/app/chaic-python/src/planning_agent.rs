@@ -64,7 +64,7 @@ impl PlanningAgent {
         perception: &str,
         behavior: &str,
         rules: &str,
-        set: Vec<String>,
+        #[pyo3(from_py_with = crate::options::strings)] set: Vec<String>,
     ) -> PyResult<PlanningAgent> {
         let perception = self::perception(perception, behavior)?;
         let built_in = BuiltInWithPerception { perception: Arc::clone(&perception) };
@@ -193,7 +193,7 @@ impl Planner {
         image_size: u32,
         behavior: &str,
         rules: &str,
-        set: Vec<String>,
+        #[pyo3(from_py_with = crate::options::strings)] set: Vec<String>,
     ) -> PyResult<Planner> {
         let perception = self::perception(perception, behavior)?;
         sensors(&[], image_size)?;

@@ -16,10 +16,13 @@ use pythonize::depythonize;
 
 use crate::action;
 use crate::episode::{Episode, encode_png};
-use crate::error::{failure, from_env, mistake, no_attribute, poisoned};
+use crate::error::{agent_number, failure, from_env, mistake, no_attribute, poisoned};
 use crate::observation::{Briefing, Observation, arrays, plain};
-use crate::options::{Options, sensors};
+use crate::options::{Options, sensors, strings};
 use crate::threads::detached;
+
+/// Default width and height of the view of an agent, pixels.
+const VIEW_SIZE: u32 = 512;
 
 /// Proprioception, and the mask of actions that the hands allow.
 type ProprioceptionArrays<'py> = (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<bool>>);
@@ -57,7 +60,7 @@ pub fn score<'py>(py: Python<'py>, env: &Env) -> PyResult<Bound<'py, PyAny>> {
 /// - `partner`: `"rules"` for the partner of the task, or `"caller"`;
 /// - `grants` (docs/grants.md), `images` (of `"rgb"`, `"depth"`, `"ids"`) and `image_size` of the caller's agents;
 /// - `partner_image_size`: image size of all other agents; by default that of scored runs;
-/// - `rules`, `set` and `appearance`, as in `chaic eval`.
+/// - `rules`, `set` and `appearance`, as in `chaic eval`. `grants`, `images` and `set` are one string or several.
 #[pyclass(module = "chaic._chaic")]
 pub struct World {
     env: Mutex<Env>,
@@ -297,23 +300,27 @@ impl World {
     }
 
     /// Renders the view of an agent, by default the helper if there is one, or of a camera (a dictionary as
-    /// `Observation.camera`). Returns arrays by name: `rgb`, `depth`, `ids`. The method ignores grants; agents use
-    /// `observe`.
-    #[pyo3(signature = (agent=None, camera=None, image_size=512, images=None))]
+    /// `Observation.camera`). `image_size` is the width and height of an agent's view, 512 by default; a camera has its
+    /// own. Returns arrays by name: `rgb`, `depth`, `ids`. The method ignores grants; agents use `observe`.
+    #[pyo3(signature = (agent=None, camera=None, image_size=None, images=None))]
     fn render<'py>(
         &mut self,
         py: Python<'py>,
-        agent: Option<u8>,
+        agent: Option<&Bound<'py, PyAny>>,
         camera: Option<&Bound<'py, PyAny>>,
-        image_size: u32,
-        images: Option<Vec<String>>,
+        image_size: Option<u32>,
+        images: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let kinds = images.unwrap_or_else(|| vec!["rgb".to_owned()]);
-        let sensors = sensors(&kinds, image_size)?;
-        let channels = Channels::from(sensors);
-        if agent.is_some() && camera.is_some() {
+        if camera.is_some() && agent.is_some() {
             return Err(mistake("give an agent or a camera"));
         }
+        if camera.is_some() && image_size.is_some() {
+            return Err(mistake("a camera has its own width and height; give no image_size"));
+        }
+        let agent = agent.map(agent_number).transpose()?;
+        let image_size = image_size.unwrap_or(VIEW_SIZE);
+        let kinds = images.map_or_else(|| Ok(vec!["rgb".to_owned()]), strings)?;
+        let channels = Channels::from(sensors(&kinds, image_size)?);
         let has_helper = self.env()?.slots().len() > AgentId::HELPER.index();
         let default = if has_helper { AgentId::HELPER } else { AgentId::PARTNER };
         let id = self.agent(agent.unwrap_or(default.0))?;
@@ -368,7 +375,7 @@ impl World {
 
     /// Returns the picture for notebooks, as PNG.
     fn _repr_png_<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        encode_png(py, self.floor_plan(py, 640)?.readonly())
+        encode_png(py, &self.floor_plan(py, 640)?)
     }
 
     /// Raises `AttributeError`; the message names the new name of a renamed method.

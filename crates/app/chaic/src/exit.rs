@@ -1,6 +1,7 @@
 //! Exit codes; `docs/reference/exit-codes.md` has the same table for users.
 
 use anyhow::anyhow;
+use chaic_arena::ArenaError;
 use chaic_env::EnvError;
 use chaic_episodes::SplitError;
 use chaic_eval::EvalError;
@@ -47,9 +48,17 @@ impl ExitStatus {
     }
 }
 
+/// Returns the error of `chaic-eval` that this error is or wraps.
+fn eval_error(error: &anyhow::Error) -> Option<&EvalError> {
+    match error.downcast_ref() {
+        Some(ArenaError::Eval(inner)) => Some(inner),
+        _ => error.downcast_ref(),
+    }
+}
+
 /// Returns the error of `chaic-env` that this error is or wraps.
 pub fn env_error(error: &anyhow::Error) -> Option<&EnvError> {
-    match error.downcast_ref() {
+    match eval_error(error) {
         Some(EvalError::Env(inner)) => Some(inner),
         _ => error.downcast_ref(),
     }
@@ -66,7 +75,7 @@ pub fn code_of(error: &anyhow::Error) -> u8 {
     let is_usage = env.is_some_and(EnvError::is_usage)
         || llm.is_some_and(LlmError::is_usage)
         || registry.is_some_and(|inner| inner.is::<Refusal>())
-        || error.downcast_ref().is_some_and(EvalError::is_usage)
+        || eval_error(error).is_some_and(EvalError::is_usage)
         || error.downcast_ref().is_some_and(ExportError::is_usage)
         || error.downcast_ref().is_some_and(StoreError::is_usage)
         || error.downcast_ref().is_some_and(StudyError::is_usage)
@@ -97,8 +106,9 @@ mod tests {
             key_env: String::new(),
             is_key_named: true,
         };
+        let unknown_helper = || EnvError::UnknownHelper { name: "x".to_owned(), known: Vec::new() };
         let (name, problem) = ("map.txt".to_owned(), "line 2".to_owned());
-        let cases: [(anyhow::Error, u8); 12] = [
+        let cases: [(anyhow::Error, u8); 16] = [
             (no_key().into(), USAGE),
             (EnvError::Registry(no_key().into()).into(), USAGE),
             (not_named.into(), USAGE),
@@ -106,6 +116,10 @@ mod tests {
             (LlmError::Endpoint { problem: "no answer".to_owned() }.into(), FAILED),
             (EvalError::Options("no".to_owned()).into(), USAGE),
             (EvalError::NotEmpty { path: folder() }.into(), FAILED),
+            (ArenaError::from(EvalError::Options("no".to_owned())).into(), USAGE),
+            (ArenaError::from(EvalError::from(unknown_helper())).into(), USAGE),
+            (ArenaError::from(EvalError::NotARun { path: folder() }).into(), FAILED),
+            (ArenaError::Score { path: folder(), problem: "missing".to_owned() }.into(), FAILED),
             (ExportError::Size(33).into(), USAGE),
             (ExportError::Rate { every: 7, frames_per_s: 30 }.into(), USAGE),
             (ExportError::NotEmpty(folder()).into(), FAILED),

@@ -3,12 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use chaic_env::helper_registry::HelperRegistry;
+use chaic_eval::EvalError;
 use chaic_eval::metrics::RunResult;
 use chaic_eval::run::RunFolder;
 use chaic_eval::verify::{VerificationReport, verify_run};
 use chaic_files::{EntryKind, kind, read_bounded, write_atomically};
 
-use crate::error::{ArenaError, Result};
+use crate::error::Result;
 use crate::score::{PlayedRun, SubmissionScore};
 use crate::sealed::Commitment;
 use crate::submission::{Submission, UnpackedSubmission, first_difference};
@@ -80,7 +81,7 @@ impl Evaluation {
     /// started with the same submission is continued.
     ///
     /// # Errors
-    /// [`ArenaError::Submission`] if the folder has another submission; those of
+    /// [`EvalError::Options`] if the folder has another submission; those of
     /// [`UnpackedSubmission::read`].
     pub fn add_submission(&self, source: &Path) -> Result<Submission> {
         let target = self.folder.join(SUBMISSION);
@@ -94,8 +95,9 @@ impl Evaluation {
         if present.sha256() == unpacked.submission().sha256() {
             return Ok(present);
         }
-        let problem = format!("it is not {}; choose another --out", source.display());
-        Err(ArenaError::Submission { path: target, problem })
+        let (present, given) = (target.display(), source.display());
+        let problem = format!("the submission in {present} is not {given}; choose another --out");
+        Err(EvalError::Options(problem).into())
     }
 
     /// Reads the submission.

@@ -1,6 +1,7 @@
 //! Folder of a submission: manifest, helper and public run.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 use chaic_agents::perception_factory::GROUND_TRUTH;
 use chaic_core::TaskId;
@@ -9,7 +10,7 @@ use chaic_env::helper_registry::{HelperRegistry, NONE};
 use chaic_env::rules::RuleSetName;
 use chaic_eval::EvalError;
 use chaic_eval::run::{RunFolder, RunOptions};
-use chaic_eval::verify::{VerificationReport, verify_run};
+use chaic_eval::verify::{VerificationReport, verify_run_until};
 use chaic_files::{EntryKind, FileError, entries, kind, kind_below, read_bounded};
 use tempfile::TempDir;
 
@@ -126,7 +127,8 @@ impl Submission {
     /// Verifies the public run: it has the options and grants of the manifest, and its results follow
     /// from its traces.
     ///
-    /// `helpers` are those of [`verify_run`]. `progress` gets the number of verified traces.
+    /// `helpers` are those of [`verify_run_until`]. `progress` gets the number of verified traces. Returns
+    /// `None` if `stop` is raised.
     ///
     /// # Errors
     /// [`ArenaError::Submission`] with the first difference; if the run cannot be read.
@@ -134,8 +136,9 @@ impl Submission {
         &self,
         helpers: &dyn HelperRegistry,
         jobs: usize,
+        stop: &AtomicBool,
         progress: &(dyn Fn(usize) + Sync),
-    ) -> Result<VerificationReport> {
+    ) -> Result<Option<VerificationReport>> {
         let problem = |problem: String| {
             refuse(&self.label, format!("`{PUBLIC}`: {}", self.with_label(&problem)))
         };
@@ -145,9 +148,9 @@ impl Submission {
         let granted = run.granted()?;
         let grants = granted.as_ref().and_then(|granted| granted.helpers.get(&self.manifest.name));
         self.check_grants(grants.copied()).map_err(problem)?;
-        let report = verify_run(&run, &options, helpers, jobs, progress)
+        let report = verify_run_until(&run, &options, helpers, jobs, stop, progress)
             .map_err(|error: EvalError| problem(error.to_string()))?;
-        match first_difference(&report) {
+        match report.as_ref().and_then(first_difference) {
             Some(difference) => Err(problem(difference)),
             None => Ok(report),
         }

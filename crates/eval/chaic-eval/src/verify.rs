@@ -2,18 +2,19 @@
 
 mod coverage;
 mod folder_check;
+mod report;
 
 pub use coverage::{Coverage, ReportState};
 pub use folder_check::Finding;
+pub use report::{Mismatch, VerificationReport};
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
+use chaic_core::AgentId;
 use chaic_core::observation::Grants;
-use chaic_core::{AgentId, Frame};
 use chaic_env::helper_registry::{self, BuiltInHelpers, HelperRegistry};
 use chaic_env::rules::RuleSet;
 use chaic_env::trace::{Decision, End, Header, Record, Trace, TraceWarning, parse};
@@ -27,65 +28,6 @@ use crate::run::{RunFolder, RunGrants, RunOptions, planned, read_journal};
 use crate::trace_file;
 
 use folder_check::FolderCheck;
-
-/// First difference between a trace and its re-simulation.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Mismatch {
-    /// Path of the trace.
-    pub path: PathBuf,
-    /// Frame of the difference.
-    pub frame: Frame,
-    /// Agent of the differing decision, if it is one.
-    pub agent: Option<AgentId>,
-    /// Recorded and re-simulated values.
-    pub problem: String,
-}
-
-impl fmt::Display for Mismatch {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: frame {}", self.path.display(), self.frame)?;
-        if let Some(agent) = self.agent {
-            write!(f, ", {agent}")?;
-        }
-        write!(f, ": {}", self.problem)
-    }
-}
-
-/// Result of verifying a run.
-#[derive(Clone, Debug, Default)]
-pub struct VerificationReport {
-    /// Number of traces without a difference.
-    pub agreeing: usize,
-    /// Number of decisions in all traces.
-    pub decisions: usize,
-    /// First difference of each differing trace, by path.
-    pub mismatches: Vec<Mismatch>,
-    /// Other problems in the run's folder.
-    pub findings: Vec<Finding>,
-    /// Files that could only be read in part.
-    pub warnings: Vec<TraceWarning>,
-    /// Numbers of planned, missing and failed episode runs.
-    pub coverage: Coverage,
-    /// Comparison of the report with the results.
-    pub report: ReportState,
-}
-
-impl VerificationReport {
-    /// Returns whether every episode run was played to its end, and every check was made and passed.
-    pub fn is_good(&self) -> bool {
-        self.is_consistent() && self.coverage.failed.is_empty()
-    }
-
-    /// Returns whether no episode run is missing, and every check was made and passed. Failed episode
-    /// runs, which score zero, are allowed.
-    pub fn is_consistent(&self) -> bool {
-        self.mismatches.is_empty()
-            && self.findings.is_empty()
-            && self.warnings.is_empty()
-            && self.coverage.missing.is_empty()
-            && self.report.is_good()
-    }
-}
 
 /// Re-simulates every trace of a run on `jobs` threads and compares all records: header, digests at
 /// each decision, events, the end, and the line in `results.jsonl`.
@@ -108,6 +50,24 @@ pub fn verify_run(
     jobs: usize,
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<VerificationReport> {
+    let never = AtomicBool::new(false);
+    let report = verify_run_until(folder, options, helpers, jobs, &never, progress)?;
+    Ok(report.expect("the stop flag is never raised"))
+}
+
+/// Verifies a run like [`verify_run`]. Returns `None` if `stop` is raised before the last trace is
+/// started.
+///
+/// # Errors
+/// Those of [`verify_run`].
+pub fn verify_run_until(
+    folder: &RunFolder,
+    options: &RunOptions,
+    helpers: &dyn HelperRegistry,
+    jobs: usize,
+    stop: &AtomicBool,
+    progress: &(dyn Fn(usize) + Sync),
+) -> Result<Option<VerificationReport>> {
     if !options.traces {
         return Err(EvalError::NoTraces { path: folder.path().to_owned() });
     }
@@ -134,7 +94,9 @@ pub fn verify_run(
         options,
         helpers,
     };
-    let checked = verifier.check_all(&paths, jobs, progress)?;
+    let Some(checked) = verifier.check_all(&paths, jobs, stop, progress)? else {
+        return Ok(None);
+    };
     let mut report = VerificationReport {
         findings: contents.findings,
         mismatches: contents.missing,
@@ -161,7 +123,7 @@ pub fn verify_run(
         problem: problem.to_string(),
     }));
     report.mismatches.sort_by(|a, b| a.path.cmp(&b.path));
-    Ok(report)
+    Ok(Some(report))
 }
 
 /// Verifies the header and the records of a single trace; returns the first difference.
@@ -249,18 +211,20 @@ struct TraceVerifier<'a> {
 }
 
 impl TraceVerifier<'_> {
-    /// Checks all traces on `jobs` threads; returns the results in the order of the traces.
+    /// Checks all traces on `jobs` threads; returns the results in the order of the traces, or `None`
+    /// if `stop` is raised.
     fn check_all(
         &self,
         paths: &[PathBuf],
         jobs: usize,
+        stop: &AtomicBool,
         progress: &(dyn Fn(usize) + Sync),
-    ) -> Result<Vec<Result<TraceResult>>> {
+    ) -> Result<Option<Vec<Result<TraceResult>>>> {
         let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
         let wanted = jobs.clamp(1, paths.len().max(1));
         let checked = Mutex::new(Vec::with_capacity(paths.len()));
         let work = || {
-            loop {
+            while !stop.load(Ordering::Relaxed) {
                 let k = next.fetch_add(1, Ordering::Relaxed);
                 let Some(path) = paths.get(k) else { break };
                 let result = self.check_file(path);
@@ -280,8 +244,11 @@ impl TraceVerifier<'_> {
             Ok(())
         })?;
         let mut checked = checked.into_inner().unwrap_or_else(|e| e.into_inner());
+        if checked.len() < paths.len() {
+            return Ok(None);
+        }
         checked.sort_by_key(|(k, _)| *k);
-        Ok(checked.into_iter().map(|(_, result)| result).collect())
+        Ok(Some(checked.into_iter().map(|(_, result)| result).collect()))
     }
 
     fn check_file(&self, path: &Path) -> Result<TraceResult> {
@@ -445,6 +412,8 @@ impl TraceVerifier<'_> {
                 if is_helper {
                     expected.isolation = of_run(|granted| &granted.isolation);
                 } else {
+                    // `run.json` has neither of a partner.
+                    expected.isolation.clone_from(&actual.isolation);
                     expected.weights.clone_from(&actual.weights);
                 }
             } else if recorded.is_some_and(|grants| grants != expected.grants) {

@@ -47,11 +47,15 @@ impl EpisodeSetWriter {
         Ok(())
     }
 
-    /// Writes the card and the metadata; returns the number of episodes.
+    /// Writes the card and the metadata; returns the number of episodes. Without episodes, nothing of the
+    /// data set is left.
     ///
     /// # Errors
     /// If a file cannot be written.
     pub fn finish(self, split: &Split) -> Result<usize, ExportError> {
+        if self.n == 0 {
+            return Ok(0);
+        }
         let description = description(split, self.n);
         write_description(self.folder.path(), "chaic-episodes", &description)?;
         self.folder.finish();
@@ -123,4 +127,25 @@ fn fields() -> Vec<Field> {
             "Kind of person of the partner",
         ),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use chaic_episodes::find_episode;
+
+    use super::*;
+
+    #[test]
+    fn a_data_set_without_episodes_leaves_nothing() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let out = folder.path().join("set");
+        let split: Split = "gen:0..1".parse().expect("a split");
+        let writer = EpisodeSetWriter::create(&out).expect("a new folder");
+        assert_eq!(writer.finish(&split).expect("no file is written"), 0);
+        assert!(!out.exists());
+        let mut writer = EpisodeSetWriter::create(&out).expect("a new folder");
+        writer.add(&find_episode("shopping/gen/0").expect("an episode")).expect("a file");
+        assert_eq!(writer.finish(&split).expect("the disk has space"), 1);
+        assert!(out.join("README.md").is_file());
+    }
 }

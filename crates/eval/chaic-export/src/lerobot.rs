@@ -463,6 +463,13 @@ fn file_groups() -> Vec<FileGroup> {
     vec![
         group("data-files", "data/*/*.parquet", "application/x-parquet", "Frames of one episode"),
         group("video-files", "videos/*/*/*.mp4", "video/mp4", "First-person video of one episode"),
+        group("task-files", "meta/tasks.parquet", "application/x-parquet", "Names of the tasks"),
+        group(
+            "episode-files",
+            "meta/episodes/*/*.parquet",
+            "application/x-parquet",
+            "Task, length and files of each episode",
+        ),
         group("meta-files", "meta/*.json", "application/json", "Features and statistics"),
     ]
 }

@@ -9,7 +9,7 @@
 //!
 //! **Invariants**
 //! - After an interruption, the data set is complete for the episodes exported so far.
-//! - After an error, nothing of the data set is left.
+//! - After an error, or an interruption of the first episode, nothing of the data set is left.
 
 pub mod card;
 pub mod croissant;

@@ -100,6 +100,10 @@ fn an_episode_is_exported_as_a_table_and_a_video() {
     assert_eq!(rows(&out.join("meta/tasks.parquet")).len(), 1);
     let video_path = out.join("videos/observation.images.ego/chunk-000/file-001.mp4");
     assert!(fs::metadata(video_path).unwrap().len() > 1000);
+    let card = fs::read_to_string(out.join("README.md")).unwrap();
+    for files in ["`meta/tasks.parquet`", "`meta/episodes/*/*.parquet`"] {
+        assert!(card.contains(files), "{files}: {card}");
+    }
     let info: serde_json::Value =
         serde_json::from_slice(&fs::read(out.join("meta/info.json")).unwrap()).unwrap();
     assert_eq!((&info["total_frames"], &info["fps"]), (&n.into(), &1.into()));

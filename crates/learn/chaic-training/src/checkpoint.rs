@@ -53,7 +53,7 @@ pub enum CheckpointError {
     /// The checkpoint belongs to another network.
     #[error("belongs to another network than that of this configuration and version of chaic")]
     Network,
-    /// Data of the training that its folder keeps beside the checkpoint cannot be read.
+    /// Data of the training cannot be read, or has changed since the training began.
     #[error("cannot be continued: {0}")]
     Data(String),
     /// A section does not fit the training.

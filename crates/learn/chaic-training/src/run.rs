@@ -11,7 +11,7 @@ use chaic_files::{
 };
 use chaic_nn::weights::WeightsError;
 
-use crate::checkpoint::{Checkpoint, CheckpointError, Identity};
+use crate::checkpoint::{Checkpoint, CheckpointError, Identity, Section};
 use crate::config::{check_config, config_text, read_written_config};
 use crate::curves::{self, CurveRecord, Metrics, Phase, Position};
 use crate::trainer::{Trainer, TrainingError};
@@ -32,6 +32,7 @@ const METRIC_COUNTS: &str = "run.figure_counts";
 const METRIC_VALUES: &str = "run.figures";
 const VALIDATION_IS_DUE: &str = "run.validation_is_due";
 const BEST_SCORE: &str = "run.best_score";
+const INPUT_DIGEST: &str = "run.input_digest";
 
 /// Training with its locked folder.
 pub struct TrainingRun<T> {
@@ -54,21 +55,20 @@ pub fn checkpoint_bytes<T: Trainer>(
     trainer: &T,
     pending_metrics: &[Metrics],
 ) -> Result<Vec<u8>, CheckpointError> {
-    let mut checkpoint = trainer.checkpoint();
-    insert_progress(&mut checkpoint, pending_metrics, false, None);
-    checkpoint.to_bytes(&identity(trainer))
+    complete_checkpoint(trainer, pending_metrics, false, None).to_bytes(&identity(trainer))
 }
 
 /// Restores a training from the content of a checkpoint file; `None` if it was stopped.
 ///
 /// # Errors
-/// If the file is damaged or belongs to another training.
+/// If the file is damaged or belongs to another training, or the training data has changed.
 pub fn restore<T: Trainer>(
     trainer: &mut T,
     bytes: &[u8],
     stop: &AtomicBool,
 ) -> Result<Option<Checkpoint>, CheckpointError> {
     let checkpoint = Checkpoint::from_bytes(bytes, &identity(trainer))?;
+    check_input(trainer, &checkpoint)?;
     if trainer.resume(&checkpoint, stop)?.is_none() {
         return Ok(None);
     }
@@ -84,12 +84,33 @@ pub(crate) fn identity<T: Trainer>(trainer: &T) -> Identity {
     Identity::new(T::KIND, trainer.network())
 }
 
-fn insert_progress(
-    checkpoint: &mut Checkpoint,
+/// Checks that the training data is that with which the training began.
+fn check_input<T: Trainer>(trainer: &T, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+    // A checkpoint of an earlier version has no digest.
+    let expected = input_section(trainer);
+    if checkpoint.sections.get(INPUT_DIGEST).is_none_or(|recorded| *recorded == expected) {
+        return Ok(());
+    }
+    let key = T::INPUT_KEY;
+    Err(CheckpointError::Data(format!(
+        "the data of `{key}` has changed since the training began; restore it or start a new training"
+    )))
+}
+
+/// Returns the section with the digest of the training data, empty if there is none.
+fn input_section<T: Trainer>(trainer: &T) -> Section {
+    Section::Integers(trainer.input_digest().into_iter().collect())
+}
+
+/// Returns the checkpoint of a trainer with the sections of the run.
+fn complete_checkpoint<T: Trainer>(
+    trainer: &T,
     pending_metrics: &[Metrics],
     validation_is_due: bool,
     best_score: Option<f64>,
-) {
+) -> Checkpoint {
+    let mut checkpoint = trainer.checkpoint();
+    checkpoint.sections.insert(INPUT_DIGEST.to_owned(), input_section(trainer));
     let names: Vec<&str> =
         pending_metrics.iter().flat_map(|m| m.keys().map(|name| &**name)).collect();
     checkpoint.insert_bytes(METRIC_NAMES, names.join("\n").into_bytes());
@@ -100,6 +121,7 @@ fn insert_progress(
     checkpoint.insert_doubles(METRIC_VALUES, values.collect());
     checkpoint.insert_integers(VALIDATION_IS_DUE, vec![u64::from(validation_is_due)]);
     checkpoint.insert_doubles(BEST_SCORE, best_score.into_iter().collect());
+    checkpoint
 }
 
 /// Returns the metrics since the last record, whether a validation is due, and the best score.
@@ -185,7 +207,8 @@ impl<T: Trainer> TrainingRun<T> {
     /// Resumes a training; `None` if it was stopped before it was ready.
     ///
     /// # Errors
-    /// If files cannot be read, are damaged or belong to another training, or the folder is in use.
+    /// If files cannot be read, are damaged or belong to another training, the training data has
+    /// changed, or the folder is in use.
     pub fn resume(
         folder: &Path,
         progress: &mut dyn FnMut(&str),
@@ -326,9 +349,9 @@ impl<T: Trainer> TrainingRun<T> {
     }
 
     fn write_checkpoint(&self) -> Result<(), TrainingError> {
-        let mut checkpoint = self.trainer.checkpoint();
         let (is_due, best_score) = (self.validation_is_due, self.best_score);
-        insert_progress(&mut checkpoint, &self.pending_metrics, is_due, best_score);
+        let checkpoint =
+            complete_checkpoint(&self.trainer, &self.pending_metrics, is_due, best_score);
         let step = self.steps_done();
         let bytes = checkpoint
             .to_bytes(&identity(&self.trainer))

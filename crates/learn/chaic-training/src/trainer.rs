@@ -36,6 +36,8 @@ pub trait Trainer: Sized {
     /// Validation metric of which the weights with the highest value are kept; `None` to keep those
     /// of the last validation.
     const SCORE: Option<&'static str> = None;
+    /// Key of the configuration that names the data of [`Trainer::input_digest`]; empty if there is none.
+    const INPUT_KEY: &'static str = "";
 
     /// Prepares the training for its first step; `None` if it was stopped.
     ///
@@ -72,6 +74,12 @@ pub trait Trainer: Sized {
 
     /// Returns the number of steps taken.
     fn steps_done(&self) -> u64;
+
+    /// Returns a digest of the training data outside of the folder; `None` if there is none. A training
+    /// is resumed only with the same data.
+    fn input_digest(&self) -> Option<u64> {
+        None
+    }
 
     /// Returns the complete state of the training.
     fn checkpoint(&self) -> Checkpoint;

@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use chaic_nn::weights::{self, WeightsError};
 use chaic_nn::{AdamWConfig, Network, Pass};
 use chaic_training::bounds::{BoundTable, LEARNING_RATE, STEPS, integer};
+use chaic_training::checkpoint::Identity;
 use chaic_training::conformance::{bounds_every_number, refuses_damaged_checkpoints};
 use chaic_training::run::checkpoint_bytes;
 use chaic_training::{
@@ -33,13 +34,15 @@ struct ToyConfig {
     breaks_at: u64,
     /// 1 if preparation fails, else 0.
     fails: u8,
+    /// Digest of the input data; 0 without such data.
+    input: u64,
     a: u8,
     b: u8,
 }
 
 impl Default for ToyConfig {
     fn default() -> ToyConfig {
-        ToyConfig { steps: 24, learning_rate: 0.1, breaks_at: 0, fails: 0, a: 0, b: 0 }
+        ToyConfig { steps: 24, learning_rate: 0.1, breaks_at: 0, fails: 0, input: 0, a: 0, b: 0 }
     }
 }
 
@@ -69,6 +72,7 @@ impl<const HAS_SCORE: bool> Trainer for Toy<HAS_SCORE> {
         ("learning_rate", LEARNING_RATE),
         ("breaks_at", integer(0, 1000)),
         ("fails", integer(0, 1)),
+        ("input", integer(0, 9)),
         ("a", integer(0, 1)),
         ("b", integer(0, 1)),
     ];
@@ -77,6 +81,7 @@ impl<const HAS_SCORE: bool> Trainer for Toy<HAS_SCORE> {
     const CHECKPOINT_STEPS: u64 = 5;
     const VALIDATION_STEPS: u64 = 8;
     const SCORE: Option<&'static str> = if HAS_SCORE { Some("score") } else { None };
+    const INPUT_KEY: &'static str = "input";
 
     fn new(
         config: &ToyConfig,
@@ -111,6 +116,10 @@ impl<const HAS_SCORE: bool> Trainer for Toy<HAS_SCORE> {
 
     fn steps_done(&self) -> u64 {
         self.learner.adam.steps
+    }
+
+    fn input_digest(&self) -> Option<u64> {
+        Some(self.config.input).filter(|digest| *digest > 0)
     }
 
     fn checkpoint(&self) -> Checkpoint {
@@ -479,6 +488,36 @@ fn missing_damaged_and_version_1_checkpoints_are_refused_in_one_line() {
     fs::write(dir.path().join(CONFIG), config.replace("steps = 24", "steps = 23")).unwrap();
     let error = resume(dir.path()).err().unwrap().to_string();
     assert!(error.contains("has 24 steps taken, of 23"), "{error}");
+}
+
+#[test]
+fn a_training_is_resumed_only_with_the_data_with_which_it_began() {
+    let dir = tempfile::tempdir().unwrap();
+    let config = ToyConfig { input: 7, ..ToyConfig::default() };
+    drop(start(dir.path(), &config));
+    let path = dir.path().join(CONFIG);
+    let text = fs::read_to_string(&path).unwrap();
+    for input in ["input = 8", "input = 0"] {
+        fs::write(&path, text.replace("input = 7", input)).unwrap();
+        let error = resume(dir.path()).err().unwrap().to_string();
+        assert!(error.contains("the data of `input` has changed"), "{error}");
+        assert!(!error.contains('\n'), "{error}");
+    }
+    fs::write(&path, &text).unwrap();
+    drop(resume(dir.path()).unwrap());
+    // A checkpoint of an earlier version has no digest of the data.
+    let toy = <Toy>::new(&config, dir.path(), &mut |_| (), &AtomicBool::new(false));
+    let mut checkpoint = toy.unwrap().unwrap().checkpoint();
+    for name in ["run.figure_names", "run.figure_counts"] {
+        checkpoint.insert_bytes(name, Vec::new());
+    }
+    for name in ["run.figures", "run.best_score"] {
+        checkpoint.insert_doubles(name, Vec::new());
+    }
+    checkpoint.insert_integers("run.validation_is_due", vec![0]);
+    let bytes = checkpoint.to_bytes(&Identity::new(<Toy>::KIND, &network())).unwrap();
+    fs::write(dir.path().join(CHECKPOINT), bytes).unwrap();
+    resume(dir.path()).unwrap();
 }
 
 #[test]

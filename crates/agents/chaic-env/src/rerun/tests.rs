@@ -86,6 +86,11 @@ impl Agent for Scripted {
         Ok(action)
     }
 
+    /// Changes at the second action for the last time.
+    fn thought(&self) -> Thought {
+        Thought { plan: format!("step {}", self.n_acts.min(2)), ..Thought::default() }
+    }
+
     fn memory_view(&self) -> Option<MemoryView> {
         let cells = vec![ExploredCell::Unknown];
         let map = ExploredMap { min: Vec2::ZERO, cell_m: 1.0, n_columns: 1, cells };
@@ -145,8 +150,10 @@ fn an_agent_acts_again_after_a_joint_lift_replaced_its_choice() {
     let [made, made_partner] = [&scripts.helper, &scripts.partner].map(|script| scripted(script));
     let trace = played(config, EpisodeAgents::new(made, made_partner));
     let of_helper = trace.decisions().filter(|decision| decision.agent == AgentId::HELPER);
-    let actions: Vec<_> = of_helper.map(|decision| decision.action).collect();
-    assert_eq!(actions[1], Action::TurnRight, "the second choice was replaced");
+    let of_helper: Vec<_> = of_helper.collect();
+    assert_eq!(of_helper[1].action, Action::TurnRight, "the second choice was replaced");
+    let plan = of_helper[1].thought.as_ref().map(|thought| thought.plan.as_str());
+    assert_eq!(plan, Some("step 2"), "the thought of the replaced choice is recorded later");
     for (n, status) in rerun_with(&trace, &episode, &scripts) {
         assert!(n > 3 && status == RerunStatus::Equal, "{n} {status:?}");
     }

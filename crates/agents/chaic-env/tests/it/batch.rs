@@ -331,3 +331,40 @@ fn agents_without_images_observe_the_same_in_a_batch_and_alone() {
     }
     assert_eq!(alone.digest(), batch.envs()[0].digest());
 }
+
+#[test]
+fn actions_submitted_together_act_as_one_by_one() {
+    let bundled = bundled();
+    let without_images = SensorConfig { rgb: false, depth: false, ids: false, ..ALL };
+    for (sensors, is_observed) in [(ALL, false), (ALL, true), (without_images, true)] {
+        let new_batch = || {
+            let envs = (0..4).map(|n| env(&bundled, n, Grants::NONE, sensors)).collect();
+            EnvBatch::new(envs).unwrap()
+        };
+        let (mut serial, mut parallel) = (new_batch(), new_batch());
+        let mut buffers = Buffers::new(serial.layout());
+        let mut rng = RngStream::new(0, "submit many", 0);
+        for _ in 0..N_DECISIONS {
+            for batch in [&mut serial, &mut parallel] {
+                batch.advance(None);
+                if is_observed {
+                    batch.observe(buffers.images_mut()).unwrap();
+                }
+            }
+            // Slot 2 chooses twice, and there is no slot 9.
+            let actions = [3, 2, 0, 9, 2].map(|slot| (slot, random_action(&mut rng)));
+            let one_by_one: Vec<bool> =
+                actions.iter().map(|(slot, action)| serial.submit(*slot, *action)).collect();
+            assert_eq!(parallel.submit_many(&actions), one_by_one);
+            assert_eq!(parallel.waiting(), [1]);
+            let last = random_action(&mut rng);
+            assert!(serial.submit(1, last));
+            assert_eq!(parallel.submit_many(&[(1, last)]), [true]);
+        }
+        serial.advance(None);
+        parallel.advance(None);
+        for (one, other) in serial.envs().iter().zip(parallel.envs()) {
+            assert_eq!(one.digest(), other.digest());
+        }
+    }
+}

@@ -306,7 +306,7 @@ fn a_snapshot_within_a_turn_of_an_external_agent_is_restored() {
     assert!(matches!(with_agent.restore(&snapshot), Err(EnvError::OtherSnapshot { .. })));
 }
 
-/// Agent that fails, and counts how often it is asked.
+/// Agent that fails, and counts how often it is asked; copies count together.
 struct Failing(std::sync::Arc<std::sync::atomic::AtomicU32>);
 
 impl Agent for Failing {
@@ -320,6 +320,10 @@ impl Agent for Failing {
         self.0.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
         Err(AgentError::Broken("out of order".to_owned()))
     }
+
+    fn fork(&self) -> Option<Box<dyn Agent>> {
+        Some(Box::new(Failing(Arc::clone(&self.0))))
+    }
 }
 
 #[test]
@@ -328,10 +332,22 @@ fn a_failed_agent_is_not_asked_again() {
     let episode = test_episode(TaskId::NoConstraint);
     let agent = Box::new(Failing(std::sync::Arc::clone(&asked)));
     let mut env = Env::new(config(&episode), Some(Helper { agent, grants: Grants::NONE })).unwrap();
+    let start = env.snapshot().unwrap();
+    let failure = Err(AgentError::Broken("out of order".to_owned()));
     for _ in 0..3 {
-        assert_eq!(env.advance(None), Err(AgentError::Broken("out of order".to_owned())));
+        assert_eq!(env.advance(None), failure);
     }
+    // A snapshot keeps the failure.
+    let failed = env.snapshot().unwrap();
+    env.restore(&failed).unwrap();
+    assert_eq!(env.advance(None), failure);
     assert_eq!(asked.load(std::sync::atomic::Ordering::Relaxed), 1);
+    env.restore(&start).unwrap();
+    assert_eq!(env.advance(None), failure);
+    assert_eq!(asked.load(std::sync::atomic::Ordering::Relaxed), 2, "no agent had failed there");
+    env.restore(&failed).unwrap();
+    assert_eq!(env.advance(None), failure);
+    assert_eq!(asked.load(std::sync::atomic::Ordering::Relaxed), 2);
 }
 
 #[test]

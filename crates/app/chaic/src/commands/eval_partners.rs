@@ -45,10 +45,11 @@ pub(super) fn run(
     let request = if arguments.resume { request(arguments).0 } else { RunRequest::default() };
     let mut is_whole = true;
     let mut n_errors = 0;
-    for entry in folder.partners() {
-        let part = partner_arguments(arguments, &folder.run_path(&entry), &entry)?;
-        let request = partner_request(&request, &entry);
-        match session.play(&part, &folder.run_path(&entry), &request, Some(&entry.name))? {
+    let partners = folder.partners();
+    for entry in &partners {
+        let part = partner_arguments(arguments, &folder.run_path(entry), entry, &partners)?;
+        let request = partner_request(&request, entry);
+        match session.play(&part, &folder.run_path(entry), &request, Some(&entry.name))? {
             Played::Stopped => return Ok(ExitStatus::Interrupted),
             Played::Part(run) => {
                 n_errors += run.progress().errors;
@@ -107,19 +108,20 @@ fn start_runs(
             "--partners measures gains over no helper; add none, for example --helper none,rhp";
         return Err(EvalError::Options(text.to_owned()).into());
     }
-    for entry in suite.with_ordinary() {
+    let partners = suite.with_ordinary();
+    for entry in &partners {
         let run = path.join(&entry.name);
-        let part = partner_arguments(arguments, &run, &entry)?;
+        let part = partner_arguments(arguments, &run, entry, &partners)?;
         session.with_helpers(&part, &run, |helpers, _| {
-            Ok(Run::check(&run, &partner_request(&request, &entry), helpers)?)
+            Ok(Run::check(&run, &partner_request(&request, entry), helpers)?)
         })?;
     }
     let folder = SuiteFolder::start(path, suite)?;
-    for entry in folder.partners() {
-        let run = folder.run_path(&entry);
-        let part = partner_arguments(arguments, &run, &entry)?;
+    for entry in &partners {
+        let run = folder.run_path(entry);
+        let part = partner_arguments(arguments, &run, entry, &partners)?;
         session.with_helpers(&part, &run, |helpers, _| {
-            Run::open(&run, FolderMode::Resume, &partner_request(&request, &entry), helpers)?;
+            Run::open(&run, FolderMode::Resume, &partner_request(&request, entry), helpers)?;
             Ok(())
         })?;
     }
@@ -144,20 +146,23 @@ fn resumed(path: &Path, given: Option<&PartnerSuite>) -> Result<SuiteFolder> {
     Ok(folder)
 }
 
-/// Returns the options of the command for the run with one partner, which is resumed if it exists.
+/// Returns the options of the command for the run with one of the partners, which is resumed if it exists.
 fn partner_arguments(
     arguments: &EvalArguments,
     run: &Path,
     entry: &SuitePartner,
+    partners: &[SuitePartner],
 ) -> Result<EvalArguments> {
     let is_started = RunFolder::is_run(run);
     let recorded = if is_started { Some(RunFolder::read(run)?.1) } else { None };
     let helpers = arguments.helper_names().or(recorded.map(|options| options.helpers));
-    let asks_model = helpers.iter().flatten().any(|name| is_language_helper(name))
-        || entry.partner.as_deref().is_some_and(is_language_partner);
-    // Only some of the partners may be language models.
+    let is_model = |entry: &SuitePartner| entry.partner.as_deref().is_some_and(is_language_partner);
+    let asks_model =
+        helpers.iter().flatten().any(|name| is_language_helper(name)) || is_model(entry);
+    // Options for other partners do not concern this run. If they are for none, the run refuses them.
+    let are_for_others = !asks_model && partners.iter().any(is_model);
     let language =
-        if asks_model { arguments.language.clone() } else { LanguageArguments::default() };
+        if are_for_others { LanguageArguments::default() } else { arguments.language.clone() };
     Ok(EvalArguments {
         partner: entry.partner.clone(),
         person: entry.person,

@@ -48,6 +48,9 @@ fn export_episodes(arguments: &EpisodesArguments, format: OutputFormat) -> Resul
     }
     bar.finish_and_clear();
     let n = writer.finish(split)?;
+    if n == 0 {
+        return Ok(stopped_without_result());
+    }
     let text = format!("{}: {}\n", quoted_path(out), counted(n, "episode"));
     print_result(format, &json!({ "out": out, "episodes": n }), &text)?;
     if !is_complete {

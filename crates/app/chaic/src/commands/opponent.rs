@@ -103,7 +103,7 @@ fn play(
     split: DatasetSplit,
     stop: &AtomicBool,
 ) -> Result<Option<Vec<LabeledWindow>>> {
-    config.check().map_err(EvalError::Options)?;
+    config.check().and_then(|()| config.check_memory()).map_err(EvalError::Options)?;
     let bar = bars::count_bar(config.episodes as u64, "episodes");
     let mut progress = |message: &str| {
         bar.set_message(message.to_owned());

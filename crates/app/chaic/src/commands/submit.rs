@@ -118,12 +118,13 @@ fn check_submission(
             let bar = bars::count_bar(0, "traces");
             let progress = |done: usize| bar.set_position(done as u64);
             let jobs = jobs(arguments.jobs);
-            let report = submission.check_public_run(&helpers.registry(), jobs, &progress);
+            let report = submission.check_public_run(&helpers.registry(), jobs, stop, &progress);
             bar.finish_and_clear();
             report
         });
     match verified {
-        Ok(Ok(report)) => {
+        Ok(Ok(None)) => return Ok(ExitStatus::Interrupted),
+        Ok(Ok(Some(report))) => {
             let traces = counted(report.agreeing, "trace");
             checks.add(&format!("public run: {traces}, all digests agree"), None)?;
         }

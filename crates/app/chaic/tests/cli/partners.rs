@@ -165,6 +165,8 @@ fn wrong_partners_are_refused_with_one_line() {
     assert!(play(&["--partners", "suite", "--partner", "slow"]).contains("--partner"));
     let alone = ["eval", "--episodes", "short", "--helper", "rhp", "--partners", "list.json"];
     assert!(run_err(at, &[&alone[..], &["--out", "s"]].concat()).contains("add none"));
+    let unused = play(&["--partners", "list.json", "--endpoint", "http://localhost:1/v1"]);
+    assert!(unused.contains("no helper or partner asks a language model"), "{unused}");
     assert!(play(&["--partner", "habits:order=last"]).contains("nearest, farthest, random"));
 }
 

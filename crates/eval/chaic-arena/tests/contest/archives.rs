@@ -4,7 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use chaic_arena::archive::{content_sha256, extract, pack};
-use chaic_arena::{Evaluation, Submission};
+use chaic_arena::{ArenaError, Evaluation, Submission};
+use chaic_eval::EvalError;
 
 use crate::raw_tar::{MANIFEST, archive, file, folder, gzip, with_manifest};
 
@@ -128,6 +129,7 @@ fn an_evaluation_keeps_its_submission() {
     assert_eq!(first.sha256(), again.sha256());
     let error = evaluation.add_submission(&at.join("two.tar")).expect_err("another one");
     assert!(error.to_string().contains("two.tar; choose another --out"), "{error}");
+    assert!(matches!(error, ArenaError::Eval(EvalError::Options(_))), "an invalid request");
     // A folder with the same content is the same submission.
     extract(&at.join("one.tar"), &at.join("folder")).expect("a plain archive");
     let folder = evaluation.add_submission(&at.join("folder")).expect("the same submission");

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use chaic_core::task::Origin;
 use chaic_core::{Frame, TaskId};
 use chaic_env::{Digest, RunKey, slug};
-use chaic_episodes::{Episode, Split, SplitError, find_episode};
+use chaic_episodes::{Episode, EpisodeError, Split, SplitError, find_episode};
 use chaic_files::{create_folders_below, write_atomically};
 use rayon::prelude::*;
 
@@ -260,12 +260,18 @@ fn same_bytes(
 }
 
 /// Reads the episodes of the run's tasks from a user's folder, with the run's partner.
+///
+/// # Errors
+/// [`EvalError::Options`] if an episode can't be played with this partner.
 fn read_with_partner(source: &Path, options: &RunOptions) -> Result<Vec<Episode>> {
     let episodes = read_episode_files(source)?.into_iter();
     let selected = episodes.filter(|e| options.tasks.contains(&e.task()));
     selected
         .map(|episode| match options.person {
-            Some(kind) => Ok(episode.with_partner(kind)?),
+            Some(kind) => {
+                let unplayable = |error: EpisodeError| EvalError::Options(error.to_string());
+                episode.with_partner(kind).map_err(unplayable)
+            }
             None => Ok(episode),
         })
         .collect()

@@ -1,7 +1,7 @@
 //! Tests of the messages of differences.
 
-use chaic_core::Action;
 use chaic_core::agent::ChildState;
+use chaic_core::{Action, Frame};
 use chaic_env::Digest;
 use chaic_env::trace::ChildRecord;
 

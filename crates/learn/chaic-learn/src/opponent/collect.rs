@@ -1,6 +1,7 @@
 //! Collection of labeled windows from generated episodes.
 
 use std::collections::HashMap;
+use std::fs;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -16,10 +17,10 @@ use chaic_agents::policies::{
 };
 use chaic_core::observation::Grants;
 use chaic_core::rng::RngStream;
-use chaic_core::{AgentError, AgentId, Briefing, Frame, Observation, TaskId};
+use chaic_core::{AgentError, AgentId, Briefing, ClassId, Frame, Observation, TaskId};
 use chaic_env::helper_registry::Helper;
 use chaic_env::rules::RuleSet;
-use chaic_env::{Env, EpisodeAgents, EpisodeConfig, seeded_by_episode};
+use chaic_env::{Digest, Env, EpisodeAgents, EpisodeConfig, seeded_by_episode};
 pub use chaic_episodes::DatasetSplit;
 use chaic_episodes::{SeedRange, find_episode};
 use chaic_files::{FileError, read_bounded, read_user_file, write_atomically};
@@ -31,7 +32,7 @@ use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
 use serde::{Deserialize, Serialize};
 
 use super::window::{N_CLASS, N_STATE, ObservationHistory};
-use super::{N_LIMITS, OpponentGoal, limits};
+use super::{N_LIMITS, OpponentGoal, is_pickable, limits};
 use crate::candidate_scorer::CandidateSet;
 use crate::rollout::RolloutError;
 
@@ -50,8 +51,11 @@ pub struct LabeledWindow {
     pub episode: u32,
 }
 
-/// Maximum number of windows per goal. A window takes about 1.5 kB, all of them 8 GB.
+/// Maximum number of windows per goal; [`MAX_WINDOW_BYTES`] allows fewer of all goals together.
 pub const MAX_WINDOWS: u32 = 1_000_000;
+/// Maximum memory of the windows of a collection, and maximum size of a file of windows, bytes. Reading
+/// a file takes three times its size.
+pub const MAX_WINDOW_BYTES: u64 = 1 << 33;
 /// Maximum number of episodes of a collection.
 pub const MAX_EPISODES: u32 = 100_000;
 /// Bounds of [`WindowCollectionConfig`].
@@ -107,6 +111,27 @@ impl WindowCollectionConfig {
         }
         let perception = self.perception_factory().map_err(|e| e.to_string())?;
         perception.check_image_size(self.image_size)
+    }
+
+    /// Checks that the windows fit in memory, whatever the episodes give.
+    ///
+    /// # Errors
+    /// One line that describes the problem.
+    pub fn check_memory(&self) -> Result<(), String> {
+        let n_per_goal = self.max_per_class.min(self.episodes.saturating_mul(MAX_PER_EPISODE));
+        let n = OpponentGoal::ALL.len().saturating_mul(n_per_goal) as u64;
+        let n_classes = ClassId::all().filter(|class| is_pickable(*class)).count();
+        let n_features = N_STATE + n_classes * N_CLASS;
+        let window_bytes = size_of::<LabeledWindow>() + n_features * size_of::<f32>();
+        let bytes = n.saturating_mul(window_bytes as u64);
+        if bytes <= MAX_WINDOW_BYTES {
+            return Ok(());
+        }
+        let [needed, max] = [bytes, MAX_WINDOW_BYTES].map(|n| n as f64 / f64::from(1 << 30));
+        Err(format!(
+            "{n} windows may take {needed:.1} GiB of memory, more than the maximum of {max} GiB; set \
+             `max_per_class` or the number of episodes to a smaller number"
+        ))
     }
 
     fn perception_factory(&self) -> Result<Arc<dyn PerceptionFactory>, PerceptionError> {
@@ -180,6 +205,11 @@ pub enum CollectError {
     /// There are no windows.
     #[error("there are no windows; play more episodes")]
     Empty,
+    /// There are no validation windows.
+    #[error(
+        "there are no validation windows; set `collect.episodes` to a larger number, or `held_out_fraction` above 0"
+    )]
+    NoValidation,
     /// The file is not a file of windows.
     #[error("{path}: {problem}")]
     Format {
@@ -382,8 +412,6 @@ impl<P: Policy> Policy for RecordingPolicy<P> {
 
 /// Key of the metadata of a file of windows.
 const GRANTED: &str = "granted";
-/// Maximum size of a file of windows, bytes.
-const MAX_BYTES: u64 = 1 << 33;
 
 /// Writes windows as a safetensors file with one row per window: `state` (55 features),
 /// `n_choices`, `goal` (by [`OpponentGoal::index`]), `target` (candidate index or -1), `limits`
@@ -440,19 +468,41 @@ pub fn write(path: &Path, samples: &[LabeledWindow], is_granted: bool) -> Result
 /// # Errors
 /// As [`read_from_user_path`], and if the file is a link.
 pub fn read(path: &Path, is_granted: bool) -> Result<Vec<LabeledWindow>, CollectError> {
-    parse_granted(path, &read_bounded(path, MAX_BYTES)?, is_granted)
+    check_size(path)?;
+    parse_granted(path, &read_bounded(path, MAX_WINDOW_BYTES)?, is_granted)
 }
 
 /// Reads windows from a file that a user named, which may be a link.
 ///
 /// # Errors
-/// If the file cannot be read, holds no windows, or says that the partner's actions were granted
-/// although `is_granted` is false, or the reverse.
+/// If the file cannot be read, exceeds [`MAX_WINDOW_BYTES`], holds no windows, or says that the
+/// partner's actions were granted although `is_granted` is false, or the reverse.
 pub fn read_from_user_path(
     path: &Path,
     is_granted: bool,
 ) -> Result<Vec<LabeledWindow>, CollectError> {
-    parse_granted(path, &read_user_file(path, MAX_BYTES)?, is_granted)
+    read_with_digest(path, is_granted).map(|(windows, _)| windows)
+}
+
+/// As [`read_from_user_path`], with the digest of the file.
+pub(super) fn read_with_digest(
+    path: &Path,
+    is_granted: bool,
+) -> Result<(Vec<LabeledWindow>, Digest), CollectError> {
+    check_size(path)?;
+    let bytes = read_user_file(path, MAX_WINDOW_BYTES)?;
+    Ok((parse_granted(path, &bytes, is_granted)?, Digest::of_bytes(&bytes)))
+}
+
+/// Refuses a file of more than [`MAX_WINDOW_BYTES`]. Reading would cut it off.
+fn check_size(path: &Path) -> Result<(), CollectError> {
+    // Reading reports a file without metadata.
+    let n = fs::metadata(path).map_or(0, |metadata| metadata.len());
+    if n <= MAX_WINDOW_BYTES {
+        return Ok(());
+    }
+    let problem = format!("has {n} bytes, more than the maximum of {MAX_WINDOW_BYTES}");
+    Err(CollectError::Format { path: path.to_owned(), problem })
 }
 
 fn parse_granted(

@@ -5,6 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use chaic_core::geom::math;
 use chaic_core::rng::RngStream;
+use chaic_env::Digest;
 use chaic_files::{EntryKind, kind};
 use chaic_nn::weights::{self, WeightsError};
 use chaic_nn::{AdamWConfig, Network};
@@ -19,7 +20,7 @@ use serde::{Deserialize, Serialize};
 
 use super::collect::{
     COLLECT_BOUNDS, CollectError, DatasetSplit, LabeledWindow, WindowCollectionConfig, collect,
-    read, read_from_user_path, write,
+    read, read_from_user_path, read_with_digest, write,
 };
 use super::network::{Heads, N_GOALS, OpponentModel, kind as model_kind, network};
 use super::report::OpponentReport;
@@ -91,11 +92,41 @@ impl Default for OpponentConfig {
     }
 }
 
-/// Files of windows in the training folder.
-const WINDOWS: [(DatasetSplit, &str); 2] = [
-    (DatasetSplit::Train, "windows.safetensors"),
-    (DatasetSplit::Validation, "validation.safetensors"),
-];
+/// Files of training and validation windows in the training folder.
+const WINDOWS: &str = "windows.safetensors";
+const VALIDATION_WINDOWS: &str = "validation.safetensors";
+
+impl OpponentConfig {
+    /// Reads the windows of one split from the training folder, or collects and writes them; `None` if
+    /// it was stopped.
+    fn read_or_collect(
+        &self,
+        split: DatasetSplit,
+        folder: &Path,
+        progress: &mut dyn FnMut(&str),
+        stop: &AtomicBool,
+    ) -> Result<Option<Vec<LabeledWindow>>, TrainingError> {
+        let (name, max_per_class, none) = match split {
+            DatasetSplit::Train => (WINDOWS, self.collect.max_per_class, CollectError::Empty),
+            _ => (VALIDATION_WINDOWS, self.validation_max_per_class, CollectError::NoValidation),
+        };
+        let path = folder.join(name);
+        let is_granted = self.collect.granted;
+        if kind(&path)? != EntryKind::Missing {
+            return read(&path, is_granted).map(Some).map_err(TrainingError::from_data);
+        }
+        let config = WindowCollectionConfig { max_per_class, ..self.collect.clone() };
+        let collected =
+            collect(split, &config, progress, stop).map_err(TrainingError::from_data)?;
+        let Some(collected) = collected else { return Ok(None) };
+        if collected.is_empty() {
+            // A file would remain after the failed start.
+            return Err(TrainingError::from_data(none));
+        }
+        write(&path, &collected, is_granted)?;
+        Ok(Some(collected))
+    }
+}
 
 /// Trainer of the opponent model.
 pub struct OpponentTrainer {
@@ -107,6 +138,8 @@ pub struct OpponentTrainer {
     /// Indices of samples by goal, so that goals are drawn uniformly.
     by_goal: Vec<Vec<usize>>,
     validation: Vec<LabeledWindow>,
+    /// Digest of the file that `windows` names, if any.
+    input: Option<Digest>,
 }
 
 /// Validation metric by which weights are selected.
@@ -118,11 +151,12 @@ impl OpponentTrainer {
     /// Creates a trainer on these windows.
     ///
     /// # Errors
-    /// If there are no windows.
+    /// If there are no windows to train on, or none to validate with.
     fn with_windows(
         config: &OpponentConfig,
         samples: Vec<LabeledWindow>,
         validation: Vec<LabeledWindow>,
+        input: Option<Digest>,
     ) -> Result<OpponentTrainer, TrainingError> {
         let mut by_goal = vec![Vec::new(); OpponentGoal::ALL.len()];
         samples.iter().enumerate().for_each(|(k, s)| by_goal[s.goal.index()].push(k));
@@ -130,10 +164,22 @@ impl OpponentTrainer {
         if by_goal.is_empty() {
             return Err(TrainingError::from_data(CollectError::Empty));
         }
+        if validation.is_empty() {
+            return Err(TrainingError::from_data(CollectError::NoValidation));
+        }
         let network = network();
         let learner = Learner::new(&network.network, config.seed, config.shards);
         let config = config.clone();
-        Ok(OpponentTrainer { config, network, learner, steps: 0, samples, by_goal, validation })
+        Ok(OpponentTrainer {
+            config,
+            network,
+            learner,
+            steps: 0,
+            samples,
+            by_goal,
+            validation,
+            input,
+        })
     }
 }
 
@@ -145,6 +191,7 @@ impl Trainer for OpponentTrainer {
     const CHECKPOINT_STEPS: u64 = 1000;
     const VALIDATION_STEPS: u64 = 1000;
     const SCORE: Option<&'static str> = Some(GOAL_ACCURACY);
+    const INPUT_KEY: &'static str = "windows";
     const BOUNDS: BoundTable = &[
         ("seed", SEED),
         ("steps", STEPS),
@@ -166,38 +213,26 @@ impl Trainer for OpponentTrainer {
         progress: &mut dyn FnMut(&str),
         stop: &AtomicBool,
     ) -> Result<Option<OpponentTrainer>, TrainingError> {
-        let mut windows = Vec::new();
-        for (split, name) in WINDOWS {
-            if split == DatasetSplit::Validation && config.held_out_fraction > 0.0 {
-                let held_out = hold_out(&mut windows[0], config);
-                windows.push(held_out);
-                continue;
-            }
-            let path = folder.join(name);
-            let user_file = config.windows.as_ref().filter(|_| split == DatasetSplit::Train);
-            if let Some(user_file) = user_file {
-                let windows_of_user = read_from_user_path(user_file, config.collect.granted);
-                windows.push(windows_of_user.map_err(TrainingError::from_data)?);
-                continue;
-            }
-            if kind(&path)? != EntryKind::Missing {
-                let read = read(&path, config.collect.granted);
-                windows.push(read.map_err(TrainingError::from_data)?);
-                continue;
-            }
-            let max_per_class = match split {
-                DatasetSplit::Train => config.collect.max_per_class,
-                _ => config.validation_max_per_class,
-            };
-            let collected = WindowCollectionConfig { max_per_class, ..config.collect.clone() };
-            let collected =
-                collect(split, &collected, progress, stop).map_err(TrainingError::from_data)?;
-            let Some(collected) = collected else { return Ok(None) };
-            write(&path, &collected, config.collect.granted)?;
-            windows.push(collected);
-        }
-        let (validation, samples) = (windows.remove(1), windows.remove(0));
-        OpponentTrainer::with_windows(config, samples, validation).map(Some)
+        // Validation windows come first: they take less time, and a training without any is refused.
+        let validation = if config.held_out_fraction > 0.0 {
+            None
+        } else {
+            let split = DatasetSplit::Validation;
+            let windows = config.read_or_collect(split, folder, progress, stop)?;
+            let Some(windows) = windows else { return Ok(None) };
+            Some(windows)
+        };
+        let (mut samples, input) = if let Some(path) = &config.windows {
+            let read = read_with_digest(path, config.collect.granted);
+            let (windows, digest) = read.map_err(TrainingError::from_data)?;
+            (windows, Some(digest))
+        } else {
+            let windows = config.read_or_collect(DatasetSplit::Train, folder, progress, stop)?;
+            let Some(windows) = windows else { return Ok(None) };
+            (windows, None)
+        };
+        let validation = validation.unwrap_or_else(|| hold_out(&mut samples, config));
+        OpponentTrainer::with_windows(config, samples, validation, input).map(Some)
     }
 
     fn check(config: &OpponentConfig) -> Result<(), String> {
@@ -207,6 +242,8 @@ impl Trainer for OpponentTrainer {
             if windows.is_empty() {
                 return Err(format!("{}: {}", path.display(), CollectError::Empty));
             }
+        } else {
+            config.collect.check_memory()?;
         }
         config.collect.check()
     }
@@ -225,6 +262,10 @@ impl Trainer for OpponentTrainer {
 
     fn steps_done(&self) -> u64 {
         self.steps
+    }
+
+    fn input_digest(&self) -> Option<u64> {
+        self.input.map(|digest| digest.0)
     }
 
     fn checkpoint(&self) -> Checkpoint {

@@ -9,7 +9,7 @@ use chaic_core::TaskId;
 use chaic_core::rng::RngStream;
 use chaic_env::Digest;
 use chaic_env::helper_registry::{BuiltInHelpers, HelperRegistry as _, NONE};
-use chaic_env::recording::Recording;
+use chaic_env::recording::{Recording, Recordings};
 use chaic_episodes::find_episode;
 use chaic_nn::weights::{self, WeightsError};
 use chaic_nn::{AdamWConfig, Network};
@@ -120,14 +120,10 @@ enum Part {
 }
 
 impl PartnerCloningConfig {
-    /// Reads the recordings of one part; `None` if drawn partners are imitated.
-    fn read_recordings(&self, part: Part) -> Result<Option<Vec<Recording>>, TrainingError> {
-        let Some(path) = &self.recordings else { return Ok(None) };
-        let all = read_recordings(path).map_err(TrainingError::from_data)?;
-        let is_held_out = |k: usize| k.is_multiple_of(VALIDATION_INTERVAL);
-        let all = all.iter().enumerate();
-        let chosen = all.filter(|(k, _)| is_held_out(*k) == (part == Part::Validation));
-        Ok(Some(chosen.map(|(_, recording)| recording.clone()).collect()))
+    /// Reads the recordings; `None` if drawn partners are imitated.
+    fn read_recordings(&self) -> Result<Option<Recordings>, TrainingError> {
+        let read = |path: &PathBuf| read_recordings(path).map_err(TrainingError::from_data);
+        self.recordings.as_ref().map(read).transpose()
     }
 
     /// Returns an episode with a drawn partner.
@@ -170,28 +166,37 @@ impl PartnerCloningConfig {
         self.drawn(id, "demonstrated habits", index)
     }
 
-    /// Returns the validation episodes: those of each task, from the last generator. Returns `None`
-    /// if `stop` is raised.
+    /// Returns the validation episodes: those of the recordings, or those of each task, from the last
+    /// generator. Returns `None` if `stop` is raised.
     fn validation_episodes(
         &self,
+        recordings: Option<&Recordings>,
         stop: &AtomicBool,
-    ) -> Result<Option<Vec<DemonstrationEpisode>>, TrainingError> {
-        if let Some(recordings) = self.read_recordings(Part::Validation)? {
-            let episodes = recordings.iter().map(|recording| self.recorded(recording));
-            return Ok(Some(episodes.collect()));
+    ) -> Option<Vec<DemonstrationEpisode>> {
+        if let Some(recordings) = recordings {
+            let recordings = part_of(recordings, Part::Validation);
+            return Some(recordings.iter().map(|recording| self.recorded(recording)).collect());
         }
         let split = self.splits.last().map_or(GENERATORS[0], String::as_str);
         let of_task = |t: &TaskId| validation_ids(*t, split, self.validation_episodes, stop);
         let ids: Option<Vec<Vec<String>>> = self.tasks.iter().map(of_task).collect();
-        let Some(ids) = ids else { return Ok(None) };
+        let ids = ids?;
         // The tasks take turns.
         let in_turn =
             (0..self.validation_episodes).flat_map(|k| ids.iter().filter_map(move |i| i.get(k)));
         let episodes = in_turn.zip(0..);
         let drawn =
             |(id, index): (&String, u64)| self.drawn(id.clone(), "validation habits", index);
-        Ok(Some(episodes.map(drawn).collect()))
+        Some(episodes.map(drawn).collect())
     }
+}
+
+/// Returns one part of the recordings.
+fn part_of(recordings: &Recordings, part: Part) -> Vec<Recording> {
+    let is_held_out = |k: usize| k.is_multiple_of(VALIDATION_INTERVAL);
+    let all = recordings.iter().enumerate();
+    let chosen = all.filter(|(k, _)| is_held_out(*k) == (part == Part::Validation));
+    chosen.map(|(_, recording)| recording.clone()).collect()
 }
 
 /// Checks that the episode of a recording can be played.
@@ -212,6 +217,8 @@ pub struct PartnerCloningTrainer {
     config: PartnerCloningConfig,
     folder: PathBuf,
     recordings: Option<Vec<Recording>>,
+    /// Digest of all recordings, if any.
+    input: Option<Digest>,
     model: CandidateScorer,
     learner: Learner,
     iterations: u64,
@@ -253,6 +260,7 @@ impl Trainer for PartnerCloningTrainer {
     const CHECKPOINT_STEPS: u64 = 1;
     const VALIDATION_STEPS: u64 = 5;
     const SCORE: Option<&'static str> = Some(LOG_LIKELIHOOD);
+    const INPUT_KEY: &'static str = "recordings";
     const BOUNDS: BoundTable = &[
         ("seed", SEED),
         ("iterations", STEPS),
@@ -274,12 +282,18 @@ impl Trainer for PartnerCloningTrainer {
         _: &mut dyn FnMut(&str),
         stop: &AtomicBool,
     ) -> Result<Option<PartnerCloningTrainer>, TrainingError> {
-        let recordings = config.read_recordings(Part::Training)?;
-        let Some(validation) = config.validation_episodes(stop)? else { return Ok(None) };
+        let all = config.read_recordings()?;
+        let Some(validation) = config.validation_episodes(all.as_ref(), stop) else {
+            return Ok(None);
+        };
+        let recordings = all.as_ref().map(|all| part_of(all, Part::Training));
+        // The name of the recordings contains the digest of their contents.
+        let input = all.map(|all| Digest::of_bytes(all.to_string().as_bytes()));
         let model = partner_network();
         let learner = Learner::new(&model.network, config.seed, config.shards);
         Ok(Some(PartnerCloningTrainer {
             recordings,
+            input,
             validation,
             config: config.clone(),
             folder: folder.to_owned(),
@@ -301,9 +315,10 @@ impl Trainer for PartnerCloningTrainer {
         if let Some(name) = config.helpers.iter().find(|name| !known.contains(name)) {
             return Err(format!("`helpers` has `{name}`, expected {}", known.join(", ")));
         }
+        let all = config.read_recordings().map_err(|e| e.to_string())?;
+        let Some(all) = all else { return Ok(()) };
         for part in [Part::Training, Part::Validation] {
-            let recordings = config.read_recordings(part).map_err(|e| e.to_string())?;
-            let Some(recordings) = recordings else { break };
+            let recordings = part_of(&all, part);
             if recordings.is_empty() {
                 return Err("`recordings` has a single recording, expected two or more".to_owned());
             }
@@ -326,6 +341,10 @@ impl Trainer for PartnerCloningTrainer {
 
     fn steps_done(&self) -> u64 {
         self.iterations
+    }
+
+    fn input_digest(&self) -> Option<u64> {
+        self.input.map(|digest| digest.0)
     }
 
     fn checkpoint(&self) -> Checkpoint {

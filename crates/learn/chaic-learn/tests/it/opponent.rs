@@ -1,14 +1,15 @@
 //! Windows lie within bounds, have consistent labels and are read back unchanged. The model learns,
 //! with the same bits after an interruption. Reports count correctly.
 
-use std::fs;
+use std::fs::{self, File};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use chaic_core::TaskId;
 use chaic_core::capability::Persona;
 use chaic_learn::candidate_scorer::CandidateSet;
 use chaic_learn::opponent::collect::{
-    DatasetSplit, LabeledWindow, WindowCollectionConfig, collect, read, read_from_user_path, write,
+    DatasetSplit, LabeledWindow, MAX_WINDOW_BYTES, WindowCollectionConfig, collect, read,
+    read_from_user_path, write,
 };
 use chaic_learn::opponent::network::{OpponentModel, network};
 use chaic_learn::opponent::report::OpponentReport;
@@ -172,9 +173,9 @@ fn a_fraction_of_the_training_windows_can_validate() {
     assert!(!out.join("validation.safetensors").exists(), "no other episode was played");
 }
 
-#[test]
-fn reports_weight_goals_equally() {
-    let sample = |goal: OpponentGoal, episode: u32| LabeledWindow {
+/// Returns a window without features.
+fn sample(goal: OpponentGoal, episode: u32) -> LabeledWindow {
+    LabeledWindow {
         window: CandidateSet {
             state: vec![0.0; N_STATE],
             candidates: vec![0.0; 2 * N_CLASS],
@@ -185,7 +186,70 @@ fn reports_weight_goals_equally() {
         target: (goal == OpponentGoal::Pick).then_some(0),
         limits: [1.0; N_LIMITS],
         episode,
+    }
+}
+
+#[test]
+fn a_training_is_not_resumed_with_another_file_of_windows() {
+    let folder = tempfile::tempdir().unwrap();
+    let (out, path) = (folder.path().join("out"), folder.path().join("w"));
+    let write_windows = |n: u32| {
+        let samples: Vec<LabeledWindow> = (0..n).map(|k| sample(OpponentGoal::Wait, k)).collect();
+        write(&path, &samples, false).unwrap();
     };
+    write_windows(4);
+    let windows = Some(path.clone());
+    let config = OpponentConfig { windows, held_out_fraction: 0.5, ..OpponentConfig::default() };
+    let run = TrainingRun::<OpponentTrainer>::start(&out, &config, None, &mut |_| (), &NEVER_STOP);
+    drop(run.unwrap().unwrap());
+    let resume =
+        || TrainingRun::<OpponentTrainer>::resume(&out, &mut |_| (), &NEVER_STOP).map(drop);
+    write_windows(5);
+    let problem = resume().unwrap_err().to_string();
+    assert!(problem.contains("the data of `windows` has changed"), "{problem}");
+    write_windows(4);
+    resume().unwrap();
+}
+
+#[test]
+fn a_training_without_validation_windows_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("w");
+    write(&path, &[sample(OpponentGoal::Wait, 0)], false).unwrap();
+    write(&folder.path().join("validation.safetensors"), &[], false).unwrap();
+    let config = OpponentConfig { windows: Some(path), ..OpponentConfig::default() };
+    let trainer = OpponentTrainer::new(&config, folder.path(), &mut |_| (), &NEVER_STOP);
+    let problem = trainer.err().unwrap().to_string();
+    assert!(problem.contains("no validation windows"), "{problem}");
+}
+
+#[test]
+fn windows_beyond_the_maximum_memory_are_refused() {
+    let collection = |max_per_class, episodes| WindowCollectionConfig {
+        max_per_class,
+        episodes,
+        ..WindowCollectionConfig::default()
+    };
+    // An episode gives at most 40 windows per goal.
+    for (max_per_class, episodes) in [(100_000, 2_400), (1_000_000, 2_400), (20_000, 100_000)] {
+        assert_eq!(collection(max_per_class, episodes).check_memory(), Ok(()));
+    }
+    let collect = collection(1_000_000, 100_000);
+    let problem = collect.check_memory().unwrap_err();
+    assert!(problem.contains("maximum of 8 GiB") && !problem.contains('\n'), "{problem}");
+    let config = OpponentConfig { collect, ..OpponentConfig::default() };
+    assert_eq!(OpponentTrainer::check(&config), Err(problem));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("w");
+    // The file has no content on the disk.
+    File::create(&path).unwrap().set_len(MAX_WINDOW_BYTES + 1).unwrap();
+    for problem in [read(&path, false), read_from_user_path(&path, false)].map(Result::unwrap_err) {
+        assert!(problem.to_string().contains("more than the maximum"), "{problem}");
+    }
+}
+
+#[test]
+fn reports_weight_goals_equally() {
     // All windows are equal, so the same goal is predicted for all of them.
     let mut samples: Vec<LabeledWindow> =
         (0..9).map(|k| sample(OpponentGoal::Unknown, k)).collect();

@@ -97,7 +97,15 @@ fn a_partner_learns_from_recordings() {
     assert!(problem.contains("a single recording"), "{problem}");
     write(40_000_002);
     assert_eq!(PartnerCloningTrainer::check(&config), Ok(()));
-    assert!(!train(&config, &folder.path().join("out")).is_empty());
+    let out = folder.path().join("out");
+    assert!(!train(&config, &out).is_empty());
+    let resume =
+        || TrainingRun::<PartnerCloningTrainer>::resume(&out, &mut |_| (), &NEVER_STOP).map(drop);
+    resume().unwrap();
+    let trace = play("low_target/gen/40000002", &registry, None);
+    fs::write(traces.join("40000002.jsonl"), trace).unwrap();
+    let problem = resume().unwrap_err().to_string();
+    assert!(problem.contains("the data of `recordings` has changed"), "{problem}");
     fs::write(traces.join("cut.jsonl"), "{\"format\":\"chaic-trace\"}\n").unwrap();
     assert!(PartnerCloningTrainer::check(&config).unwrap_err().contains("cut.jsonl"));
 }

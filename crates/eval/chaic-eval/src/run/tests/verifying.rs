@@ -282,10 +282,9 @@ fn a_run_of_another_version_and_older_forms_of_traces_verify() {
     }
 }
 
-/// Agent that waits, and has trained weights.
+/// Agent that waits in a process of its own, and has trained weights.
 struct TrainedAgent {
     weights: &'static str,
-    isolation: Option<&'static str>,
 }
 
 impl Agent for TrainedAgent {
@@ -304,7 +303,7 @@ impl Agent for TrainedAgent {
     }
 
     fn isolation(&self) -> Option<String> {
-        self.isolation.map(str::to_owned)
+        Some("sandbox".to_owned())
     }
 
     fn weights(&self) -> Option<String> {
@@ -316,8 +315,8 @@ impl Agent for TrainedAgent {
 struct TrainedAgents(&'static str);
 
 impl TrainedAgents {
-    fn create(&self, name: &str, isolation: Option<&'static str>) -> Option<Helper> {
-        let agent = Box::new(TrainedAgent { weights: self.0, isolation });
+    fn create(&self, name: &str) -> Option<Helper> {
+        let agent = Box::new(TrainedAgent { weights: self.0 });
         (name == "trained").then(|| Helper { agent, grants: Grants::NONE })
     }
 }
@@ -328,11 +327,11 @@ impl HelperRegistry for TrainedAgents {
     }
 
     fn make(&self, name: &str, _: PlannerRules) -> Option<Helper> {
-        self.create(name, Some("sandbox"))
+        self.create(name)
     }
 
     fn partner(&self, name: &str, _: Option<&RunKey>, _: PlannerRules) -> Option<Helper> {
-        self.create(name, None)
+        self.create(name)
     }
 }
 
@@ -353,10 +352,11 @@ fn weights_perception_and_isolation_in_traces_are_those_of_the_run() {
     let people = "differs from the one that this run writes: people";
     let perception = "run.json names another perception of the helper";
     // Problems with agents whose weights have changed since, and with unknown agents.
-    let changes: [(AgentId, HeaderChange, [&str; 2]); 9] = [
+    let changes: [(AgentId, HeaderChange, [&str; 2]); 10] = [
         (AgentId::PARTNER, |_| (), ["", ""]),
-        // `run.json` has no weights of partners.
+        // `run.json` has no weights and no isolation of partners.
         (AgentId::PARTNER, |p| p.weights = other(), ["", ""]),
+        (AgentId::PARTNER, |p| p.isolation = other(), [people, ""]),
         (AgentId::PARTNER, |p| p.weights = None, [people, ""]),
         (AgentId::PARTNER, |p| p.grants.goal = true, [people, people]),
         (AgentId::HELPER, |p| p.weights = other(), [people, people]),
@@ -495,4 +495,21 @@ fn progress_counts_the_verified_traces() {
     let n_decisions = |path: &PathBuf| crate::trace_file::read(path).unwrap().0.decisions().count();
     let n_expected: usize = run.folder().traces().unwrap().iter().map(n_decisions).sum();
     assert_eq!((report.agreeing, report.decisions), (2, n_expected));
+}
+
+#[test]
+fn a_stopped_verification_has_no_report() {
+    let (files, dir) = (episode_files(&[TaskId::LowTarget], 2), tempfile::tempdir().unwrap());
+    let helpers = TestHelpers::new();
+    let request = RunRequest { seeds: None, ..request(&files, &["turner"]) };
+    let (mut run, _) = Run::open(dir.path(), FolderMode::New, &request, &helpers).unwrap();
+    assert!(play(&mut run, 1, &helpers));
+    let stop = AtomicBool::new(false);
+    let verify = |progress: &(dyn Fn(usize) + Sync)| {
+        let (folder, options) = (run.folder(), run.options());
+        crate::verify::verify_run_until(folder, options, &helpers, 1, &stop, progress).unwrap()
+    };
+    assert_eq!(verify(&|_| ()).map(|report| report.agreeing), Some(2));
+    // The user stops it after the first trace.
+    assert!(verify(&|_| stop.store(true, Ordering::Relaxed)).is_none());
 }

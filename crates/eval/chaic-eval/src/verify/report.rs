@@ -1,0 +1,68 @@
+//! Result of verifying a run.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use chaic_core::{AgentId, Frame};
+use chaic_env::trace::TraceWarning;
+
+use super::{Coverage, Finding, ReportState};
+
+/// First difference between a trace and its re-simulation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mismatch {
+    /// Path of the trace.
+    pub path: PathBuf,
+    /// Frame of the difference.
+    pub frame: Frame,
+    /// Agent of the differing decision, if it is one.
+    pub agent: Option<AgentId>,
+    /// Recorded and re-simulated values.
+    pub problem: String,
+}
+
+impl fmt::Display for Mismatch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: frame {}", self.path.display(), self.frame)?;
+        if let Some(agent) = self.agent {
+            write!(f, ", {agent}")?;
+        }
+        write!(f, ": {}", self.problem)
+    }
+}
+
+/// Result of verifying a run.
+#[derive(Clone, Debug, Default)]
+pub struct VerificationReport {
+    /// Number of traces without a difference.
+    pub agreeing: usize,
+    /// Number of decisions in all traces.
+    pub decisions: usize,
+    /// First difference of each differing trace, by path.
+    pub mismatches: Vec<Mismatch>,
+    /// Other problems in the run's folder.
+    pub findings: Vec<Finding>,
+    /// Files that could only be read in part.
+    pub warnings: Vec<TraceWarning>,
+    /// Numbers of planned, missing and failed episode runs.
+    pub coverage: Coverage,
+    /// Comparison of the report with the results.
+    pub report: ReportState,
+}
+
+impl VerificationReport {
+    /// Returns whether every episode run was played to its end, and every check was made and passed.
+    pub fn is_good(&self) -> bool {
+        self.is_consistent() && self.coverage.failed.is_empty()
+    }
+
+    /// Returns whether no episode run is missing, and every check was made and passed. Failed episode
+    /// runs, which score zero, are allowed.
+    pub fn is_consistent(&self) -> bool {
+        self.mismatches.is_empty()
+            && self.findings.is_empty()
+            && self.warnings.is_empty()
+            && self.coverage.missing.is_empty()
+            && self.report.is_good()
+    }
+}

@@ -2,11 +2,13 @@
 
 mod coverage;
 mod folder_check;
+mod mismatch;
 mod report;
 
 pub use coverage::{Coverage, ReportState};
 pub use folder_check::Finding;
-pub use report::{Mismatch, VerificationReport};
+pub use mismatch::Mismatch;
+pub use report::VerificationReport;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};

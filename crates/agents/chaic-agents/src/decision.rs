@@ -128,10 +128,14 @@ impl Plan {
     /// A plan is never replaced by one of the same kind, or by an idle plan (explore, follow,
     /// wait). A walk to one object is not replaced by a walk to another.
     pub fn supersedes(&self, current: &Plan) -> bool {
-        let is_pick = |p: &Plan| matches!(p, Plan::PickUp(_) | Plan::PickContainer(_));
         let is_idle = matches!(self, Plan::Explore | Plan::FollowPartner | Plan::Wait);
         let is_same_kind = std::mem::discriminant(self) == std::mem::discriminant(current);
-        !(is_same_kind || is_idle || is_pick(current) && is_pick(self))
+        !(is_same_kind || is_idle || current.is_pick() && self.is_pick())
+    }
+
+    /// Returns whether the plan is to pick up a target or a container.
+    pub fn is_pick(&self) -> bool {
+        matches!(self, Plan::PickUp(_) | Plan::PickContainer(_))
     }
 }
 
@@ -211,17 +215,47 @@ pub struct Context<'a> {
     pub is_explored: bool,
 }
 
+/// Plans that a choice may depend on. The agent computes no path lengths for the others. Plans of other
+/// kinds than these three always pass.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PlanFilter {
+    /// Classes to pick up, a subset of the possible targets; `None` for all of them.
+    pub targets: Option<Vec<ClassId>>,
+    /// True if containers to pick up matter.
+    pub containers: bool,
+    /// True if obstacles to remove matter.
+    pub obstacles: bool,
+}
+
+impl PlanFilter {
+    /// All plans.
+    pub const ALL: PlanFilter = PlanFilter { targets: None, containers: true, obstacles: true };
+    /// No target, container or obstacle.
+    pub const NO_OBJECTS: PlanFilter =
+        PlanFilter { targets: Some(Vec::new()), containers: false, obstacles: false };
+}
+
 /// Chooses among valid plans.
 pub trait Policy: Send + 'static {
     /// Starts an episode.
     fn reset(&mut self, briefing: &Briefing);
 
-    /// Returns the plan to execute next. `valid` is never empty; plans of one kind are sorted by
+    /// Returns the plan to execute next. `valid` contains the plans that pass
+    /// [`plan_filter`](Policy::plan_filter) and is never empty. Plans of one kind are sorted by
     /// distance, nearest first. [`Plan::LiftWith`] is sorted by distance from the partner.
     ///
     /// # Errors
     /// If the policy cannot choose; the agent then takes no decision.
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError>;
+
+    /// Returns the plans that the next choice may depend on; `choose` receives no others. Without the
+    /// omitted plans, the choice must have the same effect: the same plan, or another one that does
+    /// not [supersede](Policy::supersedes) the unfinished plan `current` either.
+    ///
+    /// A wrapper that records or inspects `valid` or the choice must keep [`PlanFilter::ALL`].
+    fn plan_filter(&self, _context: &Context<'_>, _current: Option<&Plan>) -> PlanFilter {
+        PlanFilter::ALL
+    }
 
     /// Returns whether to call `choose` although `current` is unfinished. `has_changed` is true if
     /// the map has changed in a relevant way since the last choice. The new choice is adopted only
@@ -291,9 +325,15 @@ pub trait Policy: Send + 'static {
     }
 }
 
-/// Returns all plans that can be started now, plans of one kind sorted by distance, and
-/// [`Plan::LiftWith`] by distance from the partner. Never empty.
-pub fn valid_plans(memory: &Memory, briefing: &Briefing) -> Vec<Plan> {
+/// Returns all plans that can be started now.
+#[cfg(test)]
+pub(crate) fn valid_plans(memory: &Memory, briefing: &Briefing) -> Vec<Plan> {
+    filtered_plans(memory, briefing, &PlanFilter::ALL)
+}
+
+/// Returns the plans that can be started now and pass the filter. Never empty. Plans of one kind are
+/// sorted by distance, [`Plan::LiftWith`] by distance from the partner.
+pub fn filtered_plans(memory: &Memory, briefing: &Briefing, filter: &PlanFilter) -> Vec<Plan> {
     let hands = HandState::new(&memory.hands, briefing);
     let mut plans = vec![Plan::Explore];
     if hands.can_put_in {
@@ -303,12 +343,14 @@ pub fn valid_plans(memory: &Memory, briefing: &Briefing) -> Vec<Plan> {
         plans.push(Plan::Deliver);
     }
     if hands.can_take_target {
-        plans.extend(reachable(memory, &briefing.possible_targets).map(Plan::PickUp));
+        let targets = filter.targets.as_ref().unwrap_or(&briefing.possible_targets);
+        plans.extend(reachable(memory, targets).map(Plan::PickUp));
     }
-    if hands.can_take_container {
+    if filter.containers && hands.can_take_container {
         plans.extend(reachable(memory, &briefing.containers).map(Plan::PickContainer));
     }
-    if hands.free_hand.is_some() && briefing.capability.removes_obstacles {
+    let removes_obstacles = filter.obstacles && briefing.capability.removes_obstacles;
+    if removes_obstacles && hands.free_hand.is_some() {
         plans.extend(reachable(memory, &briefing.obstacles).map(Plan::RemoveObstacle));
     }
     if briefing.capability.lifts_furniture && memory.hands.held().next().is_none() {
@@ -365,9 +407,11 @@ fn furniture_at_partner<'a>(
 mod tests {
     use super::*;
     use crate::perception::{GroundTruthIds, Perception as _};
-    use crate::test_support::{Toy, ToyObject, carried, hands};
+    use crate::planning::path::CostField;
+    use crate::test_support::{Toy, ToyObject, carried, hands, seen};
     use chaic_core::geom::Pose;
-    use chaic_core::{AgentId, Vec3};
+    use chaic_core::rng::RngStream;
+    use chaic_core::{AgentId, Vec2, Vec3};
 
     fn briefing() -> Briefing {
         Toy::room(4.0, 4.0).briefing()
@@ -418,6 +462,73 @@ mod tests {
         memory.update(&briefing, &observation, &GroundTruthIds.perceive(&observation));
         let pieces = furniture_at_partner(&memory, &briefing).map(|subject| subject.track);
         assert_eq!(pieces.collect::<Vec<_>>(), [near, far]);
+    }
+
+    /// Returns the path length by its definition: the cheapest cell near the object's nearest point or
+    /// its center.
+    fn reference_path_length_m(memory: &Memory, object: &MappedObject) -> Option<f32> {
+        let here = memory.position();
+        let grid = memory.map.grid();
+        let points = [object.nearest_point(here), to_xz(object.position_in_world)];
+        let cells = points.into_iter().flat_map(|p| grid.disc(p, 1.5));
+        let cost = memory.path_costs().expect("refreshed").min_cost(cells)?;
+        Some(CostField::meters(cost).max(object.distance_from(here)))
+    }
+
+    #[test]
+    fn a_filter_omits_plans_and_changes_neither_order_nor_path_lengths() {
+        let classes = ["apple", "banana", "orange", "wicker_basket", "trashbin", "bed"];
+        let (mut n_omitted, mut n_ties) = (0, 0);
+        for seed in 0..60 {
+            let mut rng = RngStream::new(seed, "plan filter", 0);
+            let mut toy = Toy::room(10.0, 6.0);
+            toy.add_wall([-0.05, -3.0], [0.05, 0.4]);
+            toy.add_wall([-0.05, 1.4], [0.05, 3.0]);
+            let briefing = Briefing { layout: Some(toy.layout()), ..toy.briefing() };
+            let mut memory = Memory::new(&briefing, crate::PlannerRules::paper());
+            let mut at = Vec2::ZERO;
+            let detections = (0..24).map(|n| {
+                // Objects of several classes may lie at one place, and have equal path lengths.
+                if !rng.chance(0.3) {
+                    at = Vec2::new(rng.range(-4.6, 4.6), rng.range(-2.6, 2.6));
+                }
+                let class = classes[rng.below(classes.len())];
+                seen(TrackId(20 + n), class, [at.x, 0.0, at.y], 0.3, 0.3)
+            });
+            memory.objects.update(&detections.collect::<Vec<_>>(), &[], 0, 10);
+            memory.pose.position = Vec3::new(rng.range(-4.0, 4.0), 0.0, rng.range(-2.0, 2.0));
+            memory.refresh();
+            let mut targets = briefing.possible_targets.clone();
+            targets.retain(|_| rng.chance(0.5));
+            let (containers, obstacles) = (rng.chance(0.5), rng.chance(0.5));
+            let filter = PlanFilter { targets: Some(targets), containers, obstacles };
+            // The copy is asked for fewer path lengths, and for those first.
+            let copy = memory.clone();
+            let some = filtered_plans(&copy, &briefing, &filter);
+            let all = valid_plans(&memory, &briefing);
+            let passes = |plan: &&Plan| match plan {
+                Plan::PickUp(it) => {
+                    filter.targets.as_ref().is_some_and(|all| all.contains(&it.class))
+                }
+                Plan::PickContainer(_) => filter.containers,
+                Plan::RemoveObstacle(_) => filter.obstacles,
+                _ => true,
+            };
+            let expected: Vec<Plan> = all.iter().filter(passes).copied().collect();
+            assert_eq!(some, expected, "seed {seed}");
+            n_omitted += all.len() - some.len();
+            let bits = |length_m: Option<f32>| length_m.map(f32::to_bits);
+            let mut lengths = Vec::new();
+            for object in memory.objects.iter() {
+                let length = bits(memory.path_length_to(object));
+                assert_eq!(bits(copy.path_length_to(object)), length, "seed {seed}");
+                assert_eq!(bits(reference_path_length_m(&memory, object)), length, "seed {seed}");
+                n_ties += usize::from(lengths.contains(&length));
+                lengths.push(length);
+            }
+            assert_eq!(filtered_plans(&memory, &briefing, &PlanFilter::ALL), all);
+        }
+        assert!(n_omitted > 300 && n_ties > 60, "{n_omitted} omitted, {n_ties} ties");
     }
 
     #[test]

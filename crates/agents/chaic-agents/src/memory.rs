@@ -107,7 +107,7 @@ pub struct Memory {
     is_partner: bool,
     gait: Gait,
     removes_obstacles: bool,
-    /// True if `dijkstra` started with the current costs and position.
+    /// True if `dijkstra` starts, or has started, with the current costs and position.
     has_path_costs: bool,
     dijkstra: RefCell<DijkstraSearch>,
     search: Search,
@@ -353,7 +353,7 @@ impl Memory {
             self.cost_model.uses_path_length() || self.rules.exploration != Exploration::Sampled;
         if needs_path_costs && !self.has_path_costs {
             let here = self.position();
-            self.dijkstra.get_mut().start(&self.costs, here);
+            self.dijkstra.get_mut().start_on_query(here);
             self.has_path_costs = true;
         }
     }
@@ -426,13 +426,15 @@ impl Memory {
     /// `None` if no path is known. Straight-line distance before the first [`Memory::refresh`], and
     /// on the lattice.
     pub fn path_length_to(&self, object: &MappedObject) -> Option<f32> {
-        let straight_m = object.distance_from(self.position());
+        let nearest = object.nearest_point(self.position());
+        let straight_m = nearest.distance(self.position());
         let path_costs = self.path_costs().filter(|_| self.cost_model.uses_path_length());
         let Some(path_costs) = path_costs else { return Some(straight_m) };
         let grid = self.map.grid();
         // The nearest point of a long object may be behind a wall, so its center is tried as well.
-        let points = [object.nearest_point(self.position()), to_xz(object.position_in_world)];
-        let cells = points.into_iter().flat_map(|p| grid.disc(p, REACHED_M));
+        let center = to_xz(object.position_in_world);
+        let points = [Some(nearest), (center != nearest).then_some(center)];
+        let cells = points.into_iter().flatten().flat_map(|p| grid.disc(p, REACHED_M));
         let cost = path_costs.min_cost(cells)?;
         Some(CostField::meters(cost).max(straight_m))
     }

@@ -8,7 +8,7 @@ use chaic_core::observation::{Grants, SensorConfig};
 use chaic_core::{Action, Agent, AgentError, AgentId, Briefing, Observation, Outcome, Target};
 
 use crate::behavior::{BehaviorLog, BehaviorModel, GroundTruthBehavior, InferredBehavior};
-use crate::decision::{Context, Plan, Policy, valid_plans};
+use crate::decision::{Context, Plan, Policy, filtered_plans};
 use crate::execution::interaction::apply_outcome;
 use crate::execution::steering::turn_towards;
 use crate::execution::{ExecutionContext, Executor, Progress};
@@ -275,7 +275,8 @@ impl Episode {
         }
         self.memory.refresh();
         let context = self.context(behavior);
-        let valid = valid_plans(&self.memory, &self.briefing);
+        let filter = policy.plan_filter(&context, self.plan.as_ref());
+        let valid = filtered_plans(&self.memory, &self.briefing, &filter);
         let chosen = policy.choose(&context, &valid)?;
         // Only after a choice: a repeated call must find the same changes.
         self.change_count = change_count;

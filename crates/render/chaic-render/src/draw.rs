@@ -122,6 +122,10 @@ pub(crate) fn draw<V: VisibilityId>(
         {
             continue;
         }
+        // Regions of the structure are known, so this test is cheaper than that of the frustum.
+        if instance.regions.is_some_and(|regions| !visible.may_show(regions, None)) {
+            continue;
+        }
         let transform = projection.camera_from(&instance.rotation, instance.origin);
         if let Some(screen_bounds) = screen_bounds(instance.corners(), projection, &transform) {
             let rect = (!screen_bounds.crosses_near).then_some(screen_bounds.rect);

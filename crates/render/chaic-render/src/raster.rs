@@ -331,7 +331,15 @@ impl<V: VisibilityId> RenderTarget<V> {
                 starts[k] = q_left + depth_plane.dv * (v - depth_plane.v0);
             }
             let n = (end_row - row).min(ROWS as u32);
-            for k in 0..n as usize {
+            // Bit `k` is set if row `k` covers a pixel center.
+            let mut covered = 0u32;
+            for k in 0..ROWS {
+                covered |= u32::from(begins[k] < ends[k]) << k;
+            }
+            covered &= (1 << n) - 1;
+            while covered != 0 {
+                let k = covered.trailing_zeros() as usize % ROWS;
+                covered &= covered - 1;
                 let row = row as usize + k;
                 let (tiles, row) = (row / TILE_ROWS * self.tiles_per_row, row % TILE_ROWS);
                 let (inverse_depth, visibility_ids) =
@@ -424,7 +432,7 @@ fn fill_span<V: VisibilityId>(
     id: V,
 ) {
     let mut k = span.begin as usize / LANES;
-    // Most spans lie within one block: no branch separates them from empty ones.
+    // Most spans lie within one block.
     while let (Some(q), Some(o)) = (inverse_depth.get_mut(k), visibility_ids.get_mut(k)) {
         let (q, o) = (&mut q[row], &mut o[row]);
         fill_block::<V>(q, o, q0, (LANES * k) as u32, span, depth_plane, id);

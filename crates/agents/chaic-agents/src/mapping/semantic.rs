@@ -199,23 +199,49 @@ impl MappedObject {
         !self.class.info().is_carriable() && (has_moved || self.footprint.len() != n_points)
     }
 
-    /// Merges two point lists, both sorted by x, then z.
+    /// Adds points to the footprint. Most sightings of fixed objects show known points only.
     fn merge_footprint(&mut self, points: &[Vec2]) {
-        let key = |list: &[Vec2], i: usize| list.get(i).map(|p| (p.x, p.y));
-        let mut merged = Vec::with_capacity(self.footprint.len() + points.len());
-        let (mut i, mut j) = (0, 0);
-        while merged.len() < MAX_FOOTPRINT {
-            let (old, new) = (key(&self.footprint, i), key(points, j));
-            let Some(first) = old.into_iter().chain(new).min_by(|a, b| compare_points(*a, *b))
-            else {
-                break;
-            };
-            i += usize::from(old == Some(first));
-            j += usize::from(new == Some(first));
-            merged.push(Vec2::from(first));
+        if !is_merge_unchanged(&self.footprint, points) {
+            self.footprint = merge(&self.footprint, points);
         }
-        self.footprint = merged;
     }
+}
+
+/// Merges two point lists, both sorted by x, then z.
+fn merge(footprint: &[Vec2], points: &[Vec2]) -> Vec<Vec2> {
+    let key = |list: &[Vec2], i: usize| list.get(i).map(|p| (p.x, p.y));
+    let mut merged = Vec::with_capacity(footprint.len() + points.len());
+    let (mut i, mut j) = (0, 0);
+    while merged.len() < MAX_FOOTPRINT {
+        let (old, new) = (key(footprint, i), key(points, j));
+        let Some(first) = old.into_iter().chain(new).min_by(|a, b| compare_points(*a, *b)) else {
+            break;
+        };
+        i += usize::from(old == Some(first));
+        j += usize::from(new == Some(first));
+        merged.push(Vec2::from(first));
+    }
+    merged
+}
+
+/// Returns true only if [`merge`] returns an unchanged footprint. It does so for a strictly sorted,
+/// short enough one that contains `points` in its order: no new point is then before the next old
+/// one. A footprint from a granted state may be unsorted.
+fn is_merge_unchanged(footprint: &[Vec2], points: &[Vec2]) -> bool {
+    if footprint.len() > MAX_FOOTPRINT {
+        return false;
+    }
+    let mut points = points.iter().map(|p| (p.x, p.y)).peekable();
+    let mut before = None;
+    for point in footprint.iter().map(|p| (p.x, p.y)) {
+        let is_sorted = before.is_none_or(|before| compare_points(before, point).is_lt());
+        if !is_sorted || point.0.is_nan() || point.1.is_nan() {
+            return false;
+        }
+        points.next_if(|new| compare_points(*new, point).is_eq());
+        before = Some(point);
+    }
+    points.peek().is_none()
 }
 
 /// Compares by x, then by z.

@@ -92,13 +92,63 @@ impl Segments<'_> {
     }
 }
 
-/// Accumulated points of one segment.
-struct SegmentAccumulator {
-    n_pixels: u32,
-    n_points: u32,
+/// Sum and vertical extent of points.
+#[derive(Clone, Copy)]
+struct Points {
+    n: u32,
     sum: Vec3,
     low: f32,
     high: f32,
+}
+
+impl Points {
+    const EMPTY: Points =
+        Points { n: 0, sum: Vec3::ZERO, low: f32::INFINITY, high: f32::NEG_INFINITY };
+
+    #[inline(always)]
+    fn add(&mut self, p: Vec3) {
+        self.n += 1;
+        self.sum += p;
+        self.low = self.low.min(p.y);
+        self.high = self.high.max(p.y);
+    }
+}
+
+/// Direct-mapped cache of the squares of segments. An object repeats its squares in each image row,
+/// and the cache recognizes most repetitions. A square that was overwritten counts as new: lists of
+/// new squares are complete and may contain repetitions.
+struct SquareCache {
+    /// Segment and square in one key. Its index is the square's place in a window that repeats, so
+    /// that all squares of an object up to 8 m wide have different indices.
+    keys: [u64; WINDOW * WINDOW],
+}
+
+/// Side of that window, squares.
+const WINDOW: usize = 64;
+
+impl SquareCache {
+    /// Contains no square: all keys are smaller.
+    const EMPTY: SquareCache = SquareCache { keys: [u64::MAX; WINDOW * WINDOW] };
+
+    /// Inserts a square of a segment; returns whether it is new.
+    #[inline(always)]
+    fn insert(&mut self, segment: usize, square: [i16; 2]) -> bool {
+        let (x, z) = (square[0] as u16, square[1] as u16);
+        let place = usize::from(x) % WINDOW + WINDOW * (usize::from(z) % WINDOW);
+        let key = (segment as u64) << 32 | u64::from(x) << 16 | u64::from(z);
+        if self.keys[place] == key {
+            return false;
+        }
+        self.keys[place] = key;
+        true
+    }
+}
+
+/// Accumulated points of one segment.
+struct SegmentAccumulator {
+    n_pixels: u32,
+    points: Points,
+    /// Squares with points, each at least once.
     squares: Vec<[i16; 2]>,
     /// Length of the longest run of pixels in a row, and its center.
     longest: u32,
@@ -110,26 +160,9 @@ impl SegmentAccumulator {
         longest: 0,
         pixel: [0, 0],
         n_pixels: 0,
-        n_points: 0,
-        sum: Vec3::ZERO,
-        low: f32::INFINITY,
-        high: f32::NEG_INFINITY,
+        points: Points::EMPTY,
         squares: Vec::new(),
     };
-
-    #[inline(always)]
-    fn add(&mut self, p: Vec3) {
-        self.n_points += 1;
-        self.sum += p;
-        self.low = self.low.min(p.y);
-        self.high = self.high.max(p.y);
-        if p.y <= FOOTPRINT_HEIGHT_M {
-            let square = [round_to_i16(p.x / FOOTPRINT_M), round_to_i16(p.z / FOOTPRINT_M)];
-            if self.squares.last() != Some(&square) {
-                self.squares.push(square);
-            }
-        }
-    }
 
     #[inline(always)]
     fn add_run(&mut self, row: usize, from: usize, end: usize) {
@@ -142,16 +175,16 @@ impl SegmentAccumulator {
     }
 
     fn finish(mut self) -> Option<SegmentMeasurement> {
-        if self.n_pixels < MIN_PIXELS || self.n_points == 0 {
+        if self.n_pixels < MIN_PIXELS || self.points.n == 0 {
             return None;
         }
         self.squares.sort_unstable();
         self.squares.dedup();
         Some(SegmentMeasurement {
             pixel: self.pixel,
-            position_in_world: self.sum / self.n_points as f32,
-            bottom_m: self.low,
-            top_m: self.high,
+            position_in_world: self.points.sum / self.points.n as f32,
+            bottom_m: self.points.low,
+            top_m: self.points.high,
             n_pixels: self.n_pixels,
             footprint: self
                 .squares
@@ -235,6 +268,7 @@ impl pulp::NullaryFnOnce for Measure<'_> {
             kinds.iter().map(|_| SegmentAccumulator::EMPTY).collect();
         let sampled_width = width.div_ceil(stride);
         let mut dynamic_mask = vec![false; sampled_width * height.div_ceil(stride)];
+        let mut known_squares = SquareCache::EMPTY;
         for row in 0..height {
             let (ids, depth) = (&ids[row * width..][..width], &depth[row * width..][..width]);
             let on_row = row % stride == 0;
@@ -255,9 +289,20 @@ impl pulp::NullaryFnOnce for Measure<'_> {
                 accumulator.add_run(row, from, end);
                 let is_person = kind == PixelKind::Person;
                 let range_m = if is_person { PERSON_RANGE_M } else { OBJECT_RANGE_M };
+                let squares = &mut accumulator.squares;
+                // A local copy stays in registers.
+                let mut points = accumulator.points;
                 let mut add = |column: usize| {
                     if depth[column] < range_m {
-                        accumulator.add(rays.point(column, row, depth[column]));
+                        let p = rays.point(column, row, depth[column]);
+                        points.add(p);
+                        if p.y <= FOOTPRINT_HEIGHT_M {
+                            let (x, z) = (p.x / FOOTPRINT_M, p.z / FOOTPRINT_M);
+                            let square = [round_to_i16(x), round_to_i16(z)];
+                            if known_squares.insert(id, square) {
+                                squares.push(square);
+                            }
+                        }
                     }
                 };
                 if kind == PixelKind::Small {
@@ -266,6 +311,7 @@ impl pulp::NullaryFnOnce for Measure<'_> {
                     let first = from.next_multiple_of(coarse_stride);
                     (first..end).step_by(coarse_stride).for_each(&mut add);
                 }
+                accumulator.points = points;
             }
         }
         (accumulators, dynamic_mask)
@@ -274,7 +320,120 @@ impl pulp::NullaryFnOnce for Measure<'_> {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
+    use chaic_core::geom::yaw_rotation;
+    use chaic_core::rng::RngStream;
+
     use super::*;
+
+    /// Measures one segment without runs and without the cache of squares. The pixel is left out.
+    fn reference_measure(
+        segments: &Segments<'_>,
+        id: usize,
+        kind: PixelKind,
+    ) -> Option<SegmentMeasurement> {
+        let Segments { segment_ids, depth_m, camera, .. } = *segments;
+        if matches!(kind, PixelKind::Background | PixelKind::Carried) {
+            return None;
+        }
+        let (rays, width) = (Rays::new(camera), camera.width as usize);
+        let stride = (width / MIN_SAMPLES_PER_ROW).max(STRIDE as usize);
+        let range_m = if kind == PixelKind::Person { PERSON_RANGE_M } else { OBJECT_RANGE_M };
+        let (mut n_pixels, mut n_points, mut sum) = (0, 0, Vec3::ZERO);
+        let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+        let mut squares = BTreeSet::new();
+        for i in (0..segment_ids.len()).filter(|i| usize::from(segment_ids[*i]) == id) {
+            n_pixels += 1;
+            let (row, column) = (i / width, i % width);
+            let is_sampled = row.is_multiple_of(stride) && column.is_multiple_of(stride);
+            if depth_m[i] < range_m && (is_sampled || kind == PixelKind::Small) {
+                let p = rays.point(column, row, depth_m[i]);
+                n_points += 1;
+                sum += p;
+                (low, high) = (low.min(p.y), high.max(p.y));
+                if p.y <= FOOTPRINT_HEIGHT_M {
+                    squares.insert([p.x, p.z].map(|v| (v / FOOTPRINT_M).round() as i16));
+                }
+            }
+        }
+        let point = |[x, z]: [i16; 2]| FOOTPRINT_M * Vec2::new(f32::from(x), f32::from(z));
+        (n_pixels >= MIN_PIXELS && n_points > 0).then(|| SegmentMeasurement {
+            pixel: [0, 0],
+            position_in_world: sum / n_points as f32,
+            bottom_m: low,
+            top_m: high,
+            n_pixels,
+            footprint: squares.into_iter().map(point).collect(),
+        })
+    }
+
+    #[test]
+    fn measurements_of_random_images_equal_plain_ones() {
+        let kinds = [
+            PixelKind::Background,
+            PixelKind::Carried,
+            PixelKind::Small,
+            PixelKind::Movable,
+            PixelKind::Person,
+            PixelKind::Fixed,
+            PixelKind::Small,
+            PixelKind::Fixed,
+        ];
+        let mut n_points = 0;
+        for seed in 0..24 {
+            let mut rng = RngStream::new(seed, "segments", 0);
+            let (width, height) = ([64, 301, 515][rng.below(3)], 48);
+            let eye_x = [0.0, -3.7, 4095.5, -5000.0][rng.below(4)];
+            let camera = Camera {
+                eye_in_world: Vec3::new(eye_x, 1.6, 2.3),
+                world_from_camera: yaw_rotation(rng.range(-3.0, 3.0)),
+                vertical_fov_rad: 0.3,
+                width,
+                height,
+            };
+            // Runs at nearly equal depth repeat squares; the range of depths exceeds the window of
+            // the cache.
+            let (mut ids, mut depth) = (Vec::new(), Vec::new());
+            let n_pixels = (width * height) as usize;
+            while ids.len() < n_pixels {
+                // Also ids without a kind.
+                let (id, depth_m) = (rng.below(kinds.len() + 1) as u16, rng.range(0.2, 11.0));
+                for _ in 0..1 + rng.below(80) {
+                    ids.push(id);
+                    depth.push(match rng.below(40) {
+                        0 => f32::NAN,
+                        1 => f32::INFINITY,
+                        2 => 0.0,
+                        _ => depth_m + rng.range(0.0, 0.2),
+                    });
+                }
+            }
+            ids.truncate(n_pixels);
+            depth.truncate(n_pixels);
+            let segments =
+                Segments { segment_ids: &ids, depth_m: &depth, camera: &camera, kinds: &kinds };
+            let (mut measured, _) = segments.measure();
+            measured.iter_mut().flatten().for_each(|segment| segment.pixel = [0, 0]);
+            for (id, kind) in kinds.into_iter().enumerate() {
+                assert_eq!(measured[id], reference_measure(&segments, id, kind), "{seed} {id}");
+                n_points += measured[id].as_ref().map_or(0, |segment| segment.footprint.len());
+            }
+        }
+        assert!(n_points > 5_000, "{n_points} points");
+    }
+
+    #[test]
+    fn squares_are_new_once_until_another_square_has_their_place() {
+        let mut cache = Box::new(SquareCache::EMPTY);
+        for x in -32..32 {
+            assert!((-32..32).all(|z| cache.insert(3, [x, z])));
+            assert!((-32..32).all(|z| !cache.insert(3, [x, z])));
+        }
+        assert!(!cache.insert(3, [-32, -32]) && !cache.insert(3, [31, 31]));
+        assert!(cache.insert(4, [0, 0]) && cache.insert(3, [0, 0]), "another segment");
+        assert!(cache.insert(3, [64, 0]) && cache.insert(3, [0, 0]), "another window");
+    }
 
     #[test]
     fn rounding_equals_that_of_the_standard_library() {

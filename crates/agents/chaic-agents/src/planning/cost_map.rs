@@ -1,6 +1,7 @@
 //! Cost map: the cost of entering each cell with a body of a given radius.
 
 use std::cell::OnceCell;
+use std::ops::Range;
 
 use chaic_core::Vec2;
 
@@ -22,6 +23,8 @@ const DIAGONAL: u16 = 7;
 pub(super) const M_PER_UNIT: f32 = CELL_M / STRAIGHT as f32;
 /// Maximum distance, chamfer units (1.5 m).
 pub(super) const FARTHEST: u16 = 60;
+/// Number of steps from a cell after which the distance from it is at least [`FARTHEST`].
+pub(super) const FARTHEST_CELLS: usize = FARTHEST.div_ceil(STRAIGHT) as usize;
 
 /// Cost of every cell, for a body of one radius. A [`CostModel`](super::cost_model::CostModel)
 /// writes it.
@@ -34,7 +37,19 @@ pub struct CostMap {
     pub(super) clearance: OnceCell<Vec<u16>>,
     /// Occupied cells from which `clearance` is computed; an empty list is a map without any.
     pub(super) occupied: Vec<bool>,
+    pub(super) basis: CostBasis,
     pub(super) version: u32,
+}
+
+/// Inputs of the costs, kept by a model that recomputes changed parts only.
+#[derive(Clone, Debug, Default)]
+pub(super) struct CostBasis {
+    /// State of each cell; empty before the first computation.
+    pub states: Vec<u8>,
+    /// Working memory: the states of the next computation.
+    pub latest: Vec<u8>,
+    /// Cells with temporary extra costs, and the amounts. A cell may occur several times.
+    pub extras: Vec<(usize, u32)>,
 }
 
 impl CostMap {
@@ -46,6 +61,7 @@ impl CostMap {
             cost: vec![FREE + UNKNOWN_EXTRA; grid.n_cells()],
             clearance: OnceCell::from(vec![FARTHEST; grid.n_cells()]),
             occupied: Vec::new(),
+            basis: CostBasis::default(),
             version: 0,
         }
     }
@@ -95,7 +111,7 @@ impl CostMap {
         let is_occupied = |cell: usize| self.occupied.get(cell).copied().unwrap_or(false);
         let distance = |cell| if is_occupied(cell) { 0 } else { FARTHEST };
         let mut clearance: Vec<u16> = (0..self.grid.n_cells()).map(distance).collect();
-        chamfer_transform(&self.grid, &mut clearance);
+        chamfer_transform(&mut clearance, self.grid.nx(), &(0..self.grid.nx()));
         clearance
     }
 
@@ -117,11 +133,12 @@ impl CostMap {
     }
 }
 
-/// Two-pass chamfer distance transform from the cells at distance 0.
-pub(super) fn chamfer_transform(grid: &Grid, d: &mut [u16]) {
-    let nx = grid.nx();
+/// Two-pass chamfer distance transform from the cells at known distances; all others are at
+/// [`FARTHEST`]. Distances are exact within these columns of rows with `nx` cells each.
+pub(super) fn chamfer_transform(rows: &mut [u16], nx: usize, columns: &Range<usize>) {
     let mut above: Option<&mut [u16]> = None;
-    for row in d.chunks_exact_mut(nx) {
+    for row in rows.chunks_exact_mut(nx) {
+        let row = &mut row[columns.clone()];
         if let Some(above) = above {
             step_across(row, above);
         }
@@ -129,7 +146,8 @@ pub(super) fn chamfer_transform(grid: &Grid, d: &mut [u16]) {
         above = Some(row);
     }
     let mut below: Option<&mut [u16]> = None;
-    for row in d.chunks_exact_mut(nx).rev() {
+    for row in rows.chunks_exact_mut(nx).rev() {
+        let row = &mut row[columns.clone()];
         if let Some(below) = below {
             step_across(row, below);
         }

@@ -1,6 +1,7 @@
 //! Shortest paths on the grid: A* to a goal, and Dijkstra cost fields.
 
 use std::cell::RefCell;
+use std::ops::Range;
 
 use chaic_core::Vec2;
 
@@ -142,8 +143,12 @@ impl Search {
 /// can pause after each bucket. It is bound to the costs of the map with which it started.
 #[derive(Clone, Debug, Default)]
 pub struct DijkstraSearch {
+    /// Position from which the first query starts a search.
+    pending: Option<Vec2>,
     /// Lowest cost found so far; `u32::MAX` if none.
     cost: Vec<u32>,
+    /// Range outside which all of `cost` is `u32::MAX`.
+    touched: Range<usize>,
     /// Ring of cells with their path cost, bucketed by that cost. Its length is a power of two.
     buckets: Vec<Vec<(u32, u32)>>,
     n_queued: usize,
@@ -152,19 +157,41 @@ pub struct DijkstraSearch {
 }
 
 impl DijkstraSearch {
+    /// Starts a search with the first query of [`PathCosts`]; many searches are never queried.
+    /// Costs must not change between this call and the queries.
+    pub fn start_on_query(&mut self, here: Vec2) {
+        self.pending = Some(here);
+    }
+
+    /// Starts the search that waits for a query.
+    fn start_pending(&mut self, costs: &CostMap) {
+        if let Some(here) = self.pending {
+            self.start(costs, here);
+        }
+    }
+
     /// Starts a search; a position outside the grid reaches no cell.
-    pub fn start(&mut self, costs: &CostMap, here: Vec2) {
-        self.cost.clear();
-        self.cost.resize(costs.grid().n_cells(), u32::MAX);
+    fn start(&mut self, costs: &CostMap, here: Vec2) {
+        self.pending = None;
+        let n_cells = costs.grid().n_cells();
+        if self.cost.len() == n_cells {
+            self.cost[self.touched.clone()].fill(u32::MAX);
+        } else {
+            self.cost.clear();
+            self.cost.resize(n_cells, u32::MAX);
+        }
+        self.touched = 0..0;
         self.buckets.iter_mut().for_each(Vec::clear);
         (self.n_queued, self.n_expanded) = (0, 0);
-        let most = costs.costs().iter().filter(|c| **c < OCCUPIED).max().map_or(FREE, |c| *c);
+        let open = |cost: u32| if cost < OCCUPIED { cost } else { FREE };
+        let most = costs.costs().iter().fold(FREE, |most, cost| most.max(open(*cost)));
         // The most expensive step never wraps around.
         let n_buckets = (most * DIAGONAL) as usize / BUCKET_WIDTH + 2;
         let n_buckets = n_buckets.next_power_of_two().max(self.buckets.len());
         self.buckets.resize_with(n_buckets, Vec::new);
         if let Some(start) = costs.grid().cell_at(here) {
             self.cost[start] = 0;
+            self.touched = start..start + 1;
             self.buckets[0].push((0, start as u32));
             self.n_queued = 1;
         }
@@ -172,17 +199,19 @@ impl DijkstraSearch {
 
     /// Expands the cells of the next bucket.
     fn expand_bucket(&mut self, costs: &CostMap) {
-        let DijkstraSearch { cost, buckets, n_queued, n_expanded } = self;
+        let DijkstraSearch { cost, touched, buckets, n_queued, n_expanded, .. } = self;
         let mask = buckets.len() - 1;
         let bucket = *n_expanded & mask;
         // Cells of one bucket cannot improve each other: no step costs less than its width.
         let mut cells = std::mem::take(&mut buckets[bucket]);
         *n_queued -= cells.len();
+        let (mut first, mut last) = (usize::MAX, 0);
         for (cost_so_far, cell) in cells.drain(..) {
             let cell = cell as usize;
             if cost_so_far > cost[cell] {
                 continue;
             }
+            (first, last) = (first.min(cell), last.max(cell));
             for_steps(costs.costs(), costs.grid(), cell, |next, enter, factor| {
                 let total = cost_so_far.saturating_add(enter.saturating_mul(factor));
                 if enter < OCCUPIED && total < cost[next] {
@@ -191,6 +220,12 @@ impl DijkstraSearch {
                     *n_queued += 1;
                 }
             });
+        }
+        if first <= last {
+            // Neighbors are one row and one cell away at most.
+            let margin = costs.grid().nx() + 1;
+            touched.start = touched.start.min(first.saturating_sub(margin));
+            touched.end = touched.end.max((last + margin + 1).min(cost.len()));
         }
         // Put the bucket back to reuse its allocation.
         buckets[bucket] = cells;
@@ -221,6 +256,13 @@ impl DijkstraSearch {
         }
     }
 
+    /// Expands until all costs below `limit` are final.
+    fn expand_below(&mut self, costs: &CostMap, limit: u32) {
+        while self.n_queued > 0 && self.n_expanded * BUCKET_WIDTH < limit as usize {
+            self.expand_bucket(costs);
+        }
+    }
+
     /// Returns whether a search may reach the cell: it is not occupied, or it is the start.
     fn is_open(&self, costs: &CostMap, cell: usize) -> bool {
         !costs.is_blocked(cell) || self.cost[cell] == 0
@@ -241,15 +283,25 @@ impl PathCosts<'_> {
     /// Returns the path cost to a cell, if it is reachable.
     pub fn cost(&self, cell: usize) -> Option<u32> {
         let mut dijkstra = self.dijkstra.borrow_mut();
+        dijkstra.start_pending(self.costs);
         if !dijkstra.is_open(self.costs, cell) {
             return None;
         }
         dijkstra.expand_until_final(self.costs, |cost| cost[cell])
     }
 
+    /// Returns the path cost to a cell, if it is less than `limit`. The search ends there.
+    pub fn cost_below(&self, cell: usize, limit: u32) -> Option<u32> {
+        let mut dijkstra = self.dijkstra.borrow_mut();
+        dijkstra.start_pending(self.costs);
+        dijkstra.expand_below(self.costs, limit);
+        Some(dijkstra.cost[cell]).filter(|cost| *cost < limit)
+    }
+
     /// Returns the lowest path cost to any of these cells, if one is reachable.
     pub fn min_cost(&self, cells: impl Iterator<Item = usize>) -> Option<u32> {
         let mut dijkstra = self.dijkstra.borrow_mut();
+        dijkstra.start_pending(self.costs);
         let open: Vec<usize> = cells.filter(|cell| dijkstra.is_open(self.costs, *cell)).collect();
         if open.is_empty() {
             return None;
@@ -464,14 +516,26 @@ mod tests {
             let here = grid.center(rng.below(n));
             let whole = CostField::new(&costs, here, &mut Search::new(n));
             let dijkstra = RefCell::new(DijkstraSearch::default());
-            // A search may be started again with other costs.
-            dijkstra.borrow_mut().start(&CostMap::new(grid, 0.2), grid.center(rng.below(n)));
-            dijkstra.borrow_mut().start(&costs, here);
+            // A search may be started again, partly expanded or not, with other costs and sizes.
+            for size in [[5, 9], [16, 24], [24, 16], [24, 16]] {
+                let other = CostMap::new(Grid::with_size(size[0], size[1]), 0.2);
+                let n_other = other.grid().n_cells();
+                let from = other.grid().center(rng.below(n_other));
+                dijkstra.borrow_mut().start_on_query(from);
+                let before = PathCosts { costs: &other, dijkstra: &dijkstra };
+                if rng.chance(0.7) {
+                    assert!(before.cost(rng.below(n_other)).is_some());
+                }
+            }
+            dijkstra.borrow_mut().start_on_query(here);
             let on_demand = PathCosts { costs: &costs, dijkstra: &dijkstra };
             for _ in 0..30 {
                 let cells: Vec<usize> = (0..rng.below(6)).map(|_| rng.below(n)).collect();
                 let expected = cells.iter().filter_map(|cell| whole.cost(*cell)).min();
                 assert_eq!(on_demand.min_cost(cells.into_iter()), expected, "{seed}");
+                let (cell, limit) = (rng.below(n), rng.below(8000) as u32);
+                let expected = whole.cost(cell).filter(|cost| *cost < limit);
+                assert_eq!(on_demand.cost_below(cell, limit), expected, "{seed}");
             }
             assert!((0..n).all(|cell| on_demand.cost(cell) == whole.cost(cell)), "{seed}");
         }

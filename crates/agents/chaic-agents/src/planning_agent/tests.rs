@@ -8,6 +8,7 @@ use chaic_core::task::SceneKind;
 use super::*;
 use crate::perception_factory::{GroundTruthPerceptionFactory, GroundTruthTracksFactory};
 use crate::policies::{PartnerVariantPolicy, RulePolicy, RuleProfile};
+use crate::rules::ObstacleChoice;
 use crate::test_support::{Toy, ToyObject};
 use crate::{helpers, partners};
 
@@ -299,6 +300,50 @@ fn a_plan_begins_after_the_thinking_time() {
         assert_eq!(agent.act(&toy.observe()).unwrap(), first);
         toy.apply(first);
         assert_eq!(agent.act(&toy.observe()).unwrap(), Action::TurnLeft, "it thinks once per plan");
+    }
+}
+
+/// The rules without their filter of plans.
+struct Unfiltered(RulePolicy);
+
+impl Policy for Unfiltered {
+    fn reset(&mut self, briefing: &Briefing) {
+        self.0.reset(briefing);
+    }
+
+    fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
+        self.0.choose(context, valid)
+    }
+
+    fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, has_changed: bool) -> bool {
+        self.0.reconsiders(context, current, has_changed)
+    }
+}
+
+#[test]
+fn the_filter_of_plans_changes_no_action() {
+    fn actions<P: Policy>(policy: P) -> Vec<Action> {
+        let (mut toy, _) = house();
+        toy.add(ToyObject::new("trashbin", [-3.2, 0.0, 2.3], [0.4, 0.6, 0.4]));
+        toy.size = 64;
+        let goal = Toy::goal(&[("apple", 2), ("banana", 1)]);
+        let briefing = Briefing { goal, horizon: 1500, ..toy.briefing() };
+        let obstacle_choice = ObstacleChoice::All;
+        let rules = PlannerRules { obstacle_choice, ..PlannerRules::paper() };
+        let mut agent = PlanningAgent::new(policy, rules);
+        agent.reset(&briefing);
+        let mut actions = Vec::new();
+        while toy.frame < briefing.horizon {
+            let action = agent.act(&toy.observe()).expect("the rules always choose");
+            toy.apply(action);
+            actions.push(action);
+        }
+        assert!(actions.iter().any(|a| matches!(a, Action::PickUp { .. })), "{actions:?}");
+        actions
+    }
+    for profile in [RuleProfile::PARTNER, RuleProfile::RHP, RuleProfile::ORACLE] {
+        let policy = RulePolicy::new(profile);
+        assert_eq!(actions(policy.clone()), actions(Unfiltered(policy)), "{profile:?}");
     }
 }
 

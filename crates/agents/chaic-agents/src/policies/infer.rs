@@ -397,8 +397,7 @@ impl Policy for InferPolicy {
     }
 
     fn supersedes(&self, new: &Plan, current: &Plan) -> bool {
-        let is_pick = |p: &Plan| matches!(p, Plan::PickUp(_) | Plan::PickContainer(_));
-        if is_pick(current) && is_pick(new) && new != current {
+        if current.is_pick() && new.is_pick() && new != current {
             return self.may_switch;
         }
         let is_idle = |p: &Plan| matches!(p, Plan::Explore | Plan::FollowPartner | Plan::Wait);

@@ -4,9 +4,9 @@ use chaic_core::briefing::{CompanionRole, Goal};
 use chaic_core::geom::{horizontal_distance, to_xz};
 use chaic_core::{Action, AgentError, Briefing, ClassId, FailureReason, Frame, Outcome, Role};
 
-use crate::decision::{Context, HandState, Plan, Policy, Subject};
-use crate::mapping::TrackedPerson;
+use crate::decision::{Context, HandState, Plan, PlanFilter, Policy, Subject};
 use crate::mapping::passage::stands_in_passage;
+use crate::mapping::{MappedObject, TrackedPerson};
 use crate::memory::Memory;
 use crate::rules::{Bookkeeping, ObstacleChoice, RuleProfile, TargetFilter, TargetOrder};
 use crate::track::TrackId;
@@ -24,6 +24,7 @@ pub struct RulePolicy {
 impl RulePolicy {
     /// Returns the plan that the rules choose.
     pub fn decide(&mut self, context: &Context<'_>, valid: &[Plan]) -> Plan {
+        // Keep `plan_filter` in the same order.
         self.last_choice = context.memory.frame;
         let rules = context.memory.rules;
         if !std::mem::replace(&mut self.has_looked_around, true) && rules.initial_look_around {
@@ -41,7 +42,7 @@ impl RulePolicy {
         if let Some(plan) = is_valid(Plan::PutIn) {
             return plan;
         }
-        if carries && (!hands.can_take_target || must_deliver(context, &self.profile)) {
+        if delivers_before_targets(context, &hands, &self.profile) {
             return deliver;
         }
         if self.profile.removes_obstacles
@@ -49,9 +50,7 @@ impl RulePolicy {
         {
             return *plan;
         }
-        let time_left = fraction_left(context);
-        if time_left > self.profile.container_above
-            && need.n_left() >= rules.min_for_container
+        if self.takes_container(context, &need)
             && let Some(plan) = valid.iter().find(|p| matches!(p, Plan::PickContainer(_)))
         {
             return *plan;
@@ -62,10 +61,16 @@ impl RulePolicy {
         if let Some(subject) = self.targets(context, valid, &need).first() {
             return Plan::PickUp(*subject);
         }
-        if carries && rules.delivers_when_done && (need.is_satisfied() || context.is_explored) {
+        if delivers_without_target(context, carries, &need) {
             return deliver;
         }
         Plan::Explore
+    }
+
+    /// Returns whether there is time to use a container, and need for one.
+    fn takes_container(&self, context: &Context<'_>, need: &RemainingNeeds<'_>) -> bool {
+        fraction_left(context) > self.profile.container_above
+            && need.n_left() >= context.memory.rules.min_for_container
     }
 
     /// Creates a policy with this profile.
@@ -144,8 +149,13 @@ impl RulePolicy {
                 Plan::PickUp(subject) => Some(*subject),
                 _ => None,
             })
-            .filter(|s| need.wants(s.class) && has_time_for(context, s.track))
+            .filter(|s| need.wants(s.class))
             .collect();
+        if context.memory.rules.checks_time_to_deliver && !found.is_empty() {
+            // These lengths are the same for all targets.
+            let places = context.memory.goal_places();
+            found.retain(|s| has_time_for(context, s.track, &places));
+        }
         if self.profile.target_order == TargetOrder::HeaviestLiftable {
             let strength_kg = context.briefing.capability.strength_kg;
             let rank = |s: &Subject| {
@@ -192,6 +202,35 @@ impl Policy for RulePolicy {
 
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
         Ok(self.decide(context, valid))
+    }
+
+    /// Omits the plans on which [`RulePolicy::decide`] does not depend now.
+    fn plan_filter(&self, context: &Context<'_>, current: Option<&Plan>) -> PlanFilter {
+        let (rules, briefing) = (context.memory.rules, context.briefing);
+        let hands = HandState::new(&context.memory.hands, briefing);
+        let looks_around = !self.has_looked_around && rules.initial_look_around;
+        if looks_around
+            || self.clone().child_plan(context).is_some()
+            || hands.can_put_in
+            || delivers_before_targets(context, &hands, &self.profile)
+        {
+            return PlanFilter::NO_OBJECTS;
+        }
+        let need = RemainingNeeds::new(context, &hands, &self.profile);
+        let carries = hands.to_deliver.is_some();
+        // A pick-up never replaces a pick-up. Targets then matter only if their absence leads to a
+        // delivery, and containers only if their absence leads to a lift.
+        let keeps_pick =
+            current.is_some_and(Plan::is_pick) && !delivers_without_target(context, carries, &need);
+        let may_lift = self.profile.lifts_together
+            && rules.lifts_together
+            && briefing.capability.lifts_furniture;
+        let is_wanted = |class: &ClassId| !keeps_pick && need.wants(*class);
+        PlanFilter {
+            targets: Some(briefing.possible_targets.iter().copied().filter(is_wanted).collect()),
+            containers: self.takes_container(context, &need) && (may_lift || !keeps_pick),
+            obstacles: self.profile.removes_obstacles,
+        }
     }
 
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, has_changed: bool) -> bool {
@@ -308,6 +347,26 @@ pub(super) fn is_relevant_removal(context: &Context<'_>, plan: &Plan) -> bool {
     }
 }
 
+/// Returns whether carried objects are delivered before any target is picked up.
+fn delivers_before_targets(
+    context: &Context<'_>,
+    hands: &HandState,
+    profile: &RuleProfile,
+) -> bool {
+    hands.to_deliver.is_some() && (!hands.can_take_target || must_deliver(context, profile))
+}
+
+/// Returns whether carried objects are delivered when no target is left to pick up.
+fn delivers_without_target(
+    context: &Context<'_>,
+    carries: bool,
+    need: &RemainingNeeds<'_>,
+) -> bool {
+    carries
+        && context.memory.rules.delivers_when_done
+        && (need.is_satisfied() || context.is_explored)
+}
+
 fn fraction_left(context: &Context<'_>) -> f32 {
     let horizon = context.briefing.horizon.max(1);
     horizon.saturating_sub(context.memory.frame) as f32 / horizon as f32
@@ -340,16 +399,12 @@ fn must_deliver(context: &Context<'_>, profile: &RuleProfile) -> bool {
     fraction_left(context) < threshold || is_far
 }
 
-/// Returns whether there may be time to fetch an object and bring it to a known goal place, in a
+/// Returns whether there may be time to fetch an object and bring it to one of these goal places, in a
 /// straight line at full speed.
-fn has_time_for(context: &Context<'_>, track: TrackId) -> bool {
+fn has_time_for(context: &Context<'_>, track: TrackId, places: &[(&MappedObject, f32)]) -> bool {
     let memory = context.memory;
-    let Some(object) = memory.objects.get(track).filter(|_| memory.rules.checks_time_to_deliver)
-    else {
-        return true;
-    };
+    let Some(object) = memory.objects.get(track) else { return true };
     let at = to_xz(object.position_in_world);
-    let places = memory.goal_places();
     let onward_m = places.iter().map(|(place, _)| place.distance_from(at)).min_by(f32::total_cmp);
     let Some(onward_m) = onward_m else { return true };
     let path_m = object.distance_from(memory.position()) + onward_m;

@@ -133,9 +133,13 @@ impl<'a> Search<'a> {
     }
 
     fn rated(&mut self, operations: Vec<Operation>) -> TeamPlan {
-        self.n_evaluations += 1;
-        let value = simulate(self.problem, &operations);
+        let value = self.evaluate(&operations);
         TeamPlan { operations, value }
+    }
+
+    fn evaluate(&mut self, operations: &[Operation]) -> f32 {
+        self.n_evaluations += 1;
+        simulate(self.problem, operations)
     }
 
     /// Returns a changed sequence: one or two operations removed, each reinserted, or an unused one
@@ -185,16 +189,21 @@ impl<'a> Search<'a> {
     }
 
     fn insert_best(&mut self, operations: &[Operation], new: Operation) -> TeamPlan {
-        let mut best: Option<TeamPlan> = None;
-        for at in 0..=operations.len() {
-            let mut with_new = operations.to_vec();
-            with_new.insert(at, new);
-            let rated = self.rated(with_new);
-            if best.as_ref().is_none_or(|best| rated.value > best.value) {
-                best = Some(rated);
+        let end = operations.len();
+        let mut with_new = Vec::with_capacity(end + 1);
+        with_new.push(new);
+        with_new.extend_from_slice(operations);
+        let (mut best_at, mut value) = (0, self.evaluate(&with_new));
+        for at in 1..=end {
+            // Moves the new operation to position `at`.
+            with_new.swap(at - 1, at);
+            let value_here = self.evaluate(&with_new);
+            if value_here > value {
+                (best_at, value) = (at, value_here);
             }
         }
-        best.unwrap_or_else(|| TeamPlan { operations: operations.to_vec(), value: f32::MIN })
+        with_new[best_at..].rotate_right(1);
+        TeamPlan { operations: with_new, value }
     }
 
     /// Removes each operation without which the value does not fall.

@@ -1,3 +1,5 @@
+use chaic_core::rng::RngStream;
+
 use super::*;
 use crate::mapping::grid::CELL_M;
 use crate::perception::{GroundTruthIds, Perception as _};
@@ -32,6 +34,44 @@ fn the_footprint_of_the_largest_object_is_complete() {
     assert_eq!(truck.footprint.len(), 50 * 20);
     let end = CELL_M * Vec2::new(49.0, 19.0);
     assert!(truck.distance_from(end) < 1e-3);
+}
+
+#[test]
+fn known_points_leave_a_footprint_as_a_merge_does() {
+    let bits =
+        |list: &[Vec2]| list.iter().map(|p| [p.x.to_bits(), p.y.to_bits()]).collect::<Vec<_>>();
+    let sort = |list: &mut [Vec2]| list.sort_by(|a, b| compare_points((a.x, a.y), (b.x, b.y)));
+    let mut n_unchanged = 0;
+    for seed in 0..4000 {
+        let mut rng = RngStream::new(seed, "footprints", 0);
+        let values = [-0.125, -0.0, 0.0, 0.125, 0.25, if seed % 8 == 0 { f32::NAN } else { 1.0 }];
+        let mut point = || Vec2::new(values[rng.below(6)], values[rng.below(6)]);
+        let mut old: Vec<Vec2> = (0..seed % 12).map(|_| point()).collect();
+        let mut extra = point();
+        if seed % 4 > 0 {
+            sort(&mut old);
+            old.dedup_by_key(|p| [p.x.to_bits(), p.y.to_bits()]);
+        }
+        if seed % 500 == 7 {
+            // The longest list that a merge keeps, and lists that it cuts.
+            let n_points = MAX_FOOTPRINT - 1 + rng.below(3);
+            old = (0..n_points).map(|k| Vec2::new(0.125 * k as f32, 0.0)).collect();
+            extra = old[rng.below(n_points)];
+        }
+        let mut new: Vec<Vec2> = old.iter().copied().filter(|_| rng.chance(0.7)).collect();
+        if rng.chance(0.3) {
+            new.push(extra);
+        }
+        if rng.chance(0.8) {
+            sort(&mut new);
+        }
+        let mut object = MappedObject::new(&seen(TrackId(30), "truck", [0.0; 3], 2.0, 2.0), 1);
+        object.footprint.clone_from(&old);
+        object.merge_footprint(&new);
+        assert_eq!(bits(&object.footprint), bits(&merge(&old, &new)), "{seed}: {old:?} {new:?}");
+        n_unchanged += u32::from(is_merge_unchanged(&old, &new));
+    }
+    assert!((1000..3500).contains(&n_unchanged), "{n_unchanged}");
 }
 
 #[test]

@@ -1,12 +1,16 @@
 //! The paper's rules in situations worked out by hand.
 
 use super::*;
+use crate::PlannerRules;
 use crate::behavior::BehaviorLog;
 use crate::behavior::ObservedInteraction;
+use crate::decision::{filtered_plans, valid_plans};
 use crate::memory::Memory;
-use crate::test_support::{Toy, carried, hands};
+use crate::test_support::{Toy, carried, hands, seen, seen_partner};
 use crate::track::Carried;
-use chaic_core::{Action, AgentId, Hand};
+use chaic_core::briefing::Companion;
+use chaic_core::rng::RngStream;
+use chaic_core::{Action, AgentId, EntityId, Hand, Vec3};
 
 fn subject(class: &str, track: u32) -> Subject {
     Subject { track: TrackId(track), class: ClassId::named(class) }
@@ -222,4 +226,156 @@ fn the_oracle_picks_up_the_heaviest_piece_it_can_lift_and_helps_with_heavier_one
         outcome: Some(Outcome::Failure(FailureReason::BeyondLimits)),
     });
     assert_eq!(choose(profile, &case, &log), Plan::LiftWith(*lightest));
+}
+
+const PIANO: TrackId = TrackId(50);
+/// Strength that suffices for the piano, kilograms.
+const STRONG_KG: f32 = 1000.0;
+
+/// Returns what one hand holds, drawn at random.
+fn random_load(rng: &mut RngStream, track: u16) -> Option<Carried> {
+    match rng.below(10) {
+        0..6 => None,
+        6 | 7 => Some(carried("apple", track, &[])),
+        8 => Some(carried("orange", track, &[])),
+        _ => Some(carried("wicker_basket", track, &["apple"; 3][..rng.below(4)])),
+    }
+}
+
+/// Returns a briefing, a memory of objects, people and hands, and whether all space is explored.
+fn random_situation(rng: &mut RngStream) -> (Briefing, Memory, bool) {
+    let mut toy = Toy::room(8.0, 6.0);
+    toy.size = 4;
+    toy.frame = rng.below(3000) as Frame;
+    let mut briefing = toy.briefing();
+    briefing.goal = Toy::goal(&[("apple", rng.below(4) as u32), ("banana", rng.below(3) as u32)]);
+    if rng.chance(0.15) {
+        let child = Companion { agent: AgentId::CHILD, role: CompanionRole::Child };
+        briefing.companions.push(child);
+    }
+    let body = &mut briefing.capability;
+    // A strong body lifts the piano only if the partner calls for help.
+    (body.strength_kg, body.lifts_furniture) = ([1.0, STRONG_KG][rng.below(2)], rng.chance(0.6));
+    body.removes_obstacles = rng.chance(0.8);
+    let rules = match rng.below(5) {
+        0 => PlannerRules::compat(),
+        // The empty map has no passages.
+        _ => PlannerRules { obstacle_choice: ObstacleChoice::All, ..PlannerRules::paper() },
+    };
+    let mut memory = Memory::new(&briefing, rules);
+    memory.frame = toy.frame;
+    memory.pose.position = Vec3::new(rng.range(-3.0, 3.0), 0.0, rng.range(-2.0, 2.0));
+    memory.hands = hands([random_load(rng, 40), random_load(rng, 41)]);
+    let classes = ["apple", "banana", "orange", "wicker_basket", "trashbin", "bed"];
+    let mut detections = Vec::new();
+    for track in 20..20 + rng.below(8) as u32 {
+        let at = [rng.range(-3.8, 3.8), 0.0, rng.range(-2.8, 2.8)];
+        detections.push(seen(TrackId(track), classes[rng.below(classes.len())], at, 0.4, 0.4));
+    }
+    let (x, z) = (rng.range(-3.0, 3.0), rng.range(-2.0, 2.0));
+    if rng.chance(0.7) {
+        detections.push(seen(PIANO, "piano", [x, 0.0, z], 0.6, 1.0));
+    }
+    memory.objects.update(&detections, &[], 0, memory.frame);
+    let mut people = vec![seen_partner(x + 1.0, z)];
+    if briefing.companion(CompanionRole::Child).is_some() && rng.chance(0.7) {
+        let child = EntityId::from_agent(AgentId::CHILD).into();
+        let at = [rng.range(-3.8, 3.8), 0.0, rng.range(-2.8, 2.8)];
+        people.push(seen(child, "person", at, 0.3, 1.2));
+    }
+    memory.people.update(&briefing, &toy.observe(), &people);
+    memory.refresh();
+    (briefing, memory, rng.chance(0.3))
+}
+
+/// Returns the partner's load and failed lift of the piano, recent or old, drawn at random.
+fn random_behavior(rng: &mut RngStream, now: Frame) -> BehaviorLog {
+    let mut log = BehaviorLog::default();
+    let fruit = ["apple", "banana"].map(ClassId::named);
+    if rng.chance(0.6) {
+        let held = 60..60 + rng.below(4) as u32;
+        log.partner_holds = held.map(|track| (TrackId(track), fruit[rng.below(2)])).collect();
+        log.partner_holds_frame = Some(now.saturating_sub(rng.below(400) as Frame));
+    }
+    if rng.chance(0.8) {
+        log.actions.push(ObservedInteraction {
+            agent: AgentId::PARTNER,
+            frame: now.saturating_sub(rng.below(400) as Frame),
+            action: Action::PickUp { object: PIANO, hand: Hand::Left },
+            outcome: Some(Outcome::Failure(FailureReason::BeyondLimits)),
+        });
+    }
+    log
+}
+
+#[test]
+fn the_filter_of_plans_and_shared_goal_places_change_no_choice() {
+    let no_behavior = BehaviorLog::default();
+    let profiles =
+        [RuleProfile::PARTNER, RuleProfile::RIDER, RuleProfile::RHP, RuleProfile::ORACLE];
+    let (mut n_omitted, mut n_late, mut n_help_requests, mut n_loads) = (0, 0, 0, 0);
+    // Number of adopted plans by kind, without a current plan and during a pick-up.
+    let mut n_adopted = [[0; Plan::KINDS.len()]; 2];
+    for seed in 0..1000 {
+        let mut rng = RngStream::new(seed, "rules with a filter", 0);
+        let (briefing, memory, is_explored) = random_situation(&mut rng);
+        let behavior = random_behavior(&mut rng, memory.frame);
+        let context =
+            Context { briefing: &briefing, memory: &memory, behavior: &behavior, is_explored };
+        let mut policy = RulePolicy::new(profiles[rng.below(profiles.len())]);
+        policy.has_looked_around = rng.chance(0.9);
+        let all = valid_plans(&memory, &briefing);
+        let without_behavior = Context { behavior: &no_behavior, ..context };
+        let choices = [context, without_behavior].map(|c| policy.clone().decide(&c, &all));
+        let is_strong = briefing.capability.strength_kg == STRONG_KG;
+        let is_joint_lift = matches!(choices[0], Plan::LiftWith(_));
+        n_help_requests += usize::from(is_strong && is_joint_lift);
+        n_loads += usize::from(choices[0] != choices[1] && !is_joint_lift);
+        let current_pick = all.iter().copied().find(Plan::is_pick);
+        for current in [None, Some(Plan::Explore), current_pick] {
+            let filter = policy.plan_filter(&context, current.as_ref());
+            let some = filtered_plans(&memory, &briefing, &filter);
+            n_omitted += all.len() - some.len();
+            let [(expected, state), (plan, filtered_state)] = [&all, &some].map(|valid| {
+                let mut policy = policy.clone();
+                let plan = policy.decide(&context, valid);
+                (plan, format!("{policy:?}"))
+            });
+            let adopted = |plan: Plan| current.is_none_or(|c| plan.supersedes(&c)).then_some(plan);
+            let message = || format!("seed {seed}, during {current:?}: {plan} of {filter:?}");
+            assert_eq!(adopted(plan), adopted(expected), "{}", message());
+            assert_eq!(filtered_state, state, "{}", message());
+            if let Some(plan) = adopted(plan).filter(|_| current != Some(Plan::Explore)) {
+                n_adopted[usize::from(current.is_some())][plan.kind()] += 1;
+            }
+        }
+        // The goal places are computed for each target.
+        let hands = HandState::new(&memory.hands, &briefing);
+        let need = RemainingNeeds::new(&context, &hands, &policy.profile);
+        let mut expected: Vec<Subject> =
+            all.iter().filter(|p| matches!(p, Plan::PickUp(_))).filter_map(Plan::subject).collect();
+        expected.retain(|s| need.wants(s.class));
+        let n_wanted = expected.len();
+        expected.retain(|s| {
+            !memory.rules.checks_time_to_deliver
+                || has_time_for(&context, s.track, &memory.goal_places())
+        });
+        n_late += n_wanted - expected.len();
+        assert_eq!(policy.wanted_targets(&context, &all), expected, "seed {seed}");
+    }
+    assert!(n_omitted > 1000 && n_late > 0, "{n_omitted} omitted, {n_late} late");
+    let n_by_behavior = [n_help_requests, n_loads];
+    assert!(n_by_behavior.iter().all(|n| *n > 0), "{n_by_behavior:?}");
+    let [first, replacing] = n_adopted;
+    let kinds = ["explore", "pick_up", "pick_container", "put_in", "deliver", "follow_child"];
+    for name in kinds.into_iter().chain(["turn_around"]) {
+        assert!(first[kind_index(name)] > 0, "{name}: {first:?}");
+    }
+    for name in ["deliver", "remove_obstacle", "lift_with", "follow_child", "turn_around"] {
+        assert!(replacing[kind_index(name)] > 0, "{name}: {replacing:?}");
+    }
+}
+
+fn kind_index(name: &str) -> usize {
+    Plan::KINDS.iter().position(|kind| *kind == name).expect("a kind of plan")
 }

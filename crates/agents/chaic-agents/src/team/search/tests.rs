@@ -68,6 +68,28 @@ fn the_best_of_all_sequences_of_three_targets_is_found() {
 }
 
 #[test]
+fn an_operation_is_inserted_at_the_first_of_the_best_positions() {
+    let mut rng = RngStream::new(10, "team search", 0);
+    for case in 0..60 {
+        let problem = random_problem(&mut rng);
+        let operations = random_sequence(&problem, &mut rng);
+        let mut search = Search::new(&problem);
+        let new = rng.choose(&search.single).copied().unwrap_or(Deliver);
+        let mut expected: Option<TeamPlan> = None;
+        for at in 0..=operations.len() {
+            let mut with_new = operations.clone();
+            with_new.insert(at, new);
+            let value = simulate(&problem, &with_new);
+            if expected.as_ref().is_none_or(|best| value > best.value) {
+                expected = Some(TeamPlan { operations: with_new, value });
+            }
+        }
+        assert_eq!(Some(search.insert_best(&operations, new)), expected, "{case}");
+        assert_eq!(search.n_evaluations, operations.len() + 1, "{case}");
+    }
+}
+
+#[test]
 fn the_same_seed_gives_the_same_plan() {
     let problem = random_problem(&mut RngStream::new(9, "team search", 0));
     let [a, b] = [0, 1].map(|_| {

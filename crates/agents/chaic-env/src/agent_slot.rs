@@ -148,3 +148,74 @@ pub fn world_seed(episode_seed: u64, seed: u32) -> u64 {
     let mut stream = RngStream::new(episode_seed, "eval seed", u64::from(seed));
     (0..4).fold(0, |s, _| s << 16 | stream.below(1 << 16) as u64)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+    use std::sync::Arc;
+
+    use chaic_episodes::find_episode;
+    use chaic_world::Rules;
+
+    use super::*;
+
+    fn setup(episode: &str) -> Setup {
+        find_episode(episode).expect("a bundled episode").into_setup()
+    }
+
+    /// Returns the slot of a caller with these grants.
+    fn external(grants: Grants) -> Option<AgentSlot> {
+        Some(AgentSlot::external(grants, SensorConfig::NONE))
+    }
+
+    #[test]
+    fn each_person_has_a_slot_with_its_own_grants() {
+        let rules = PlannerRules::paper();
+        let rule_based = partners::partner_grants(rules);
+        let helper = Grants { task: true, ..Grants::NONE };
+        let other = Grants { progress: true, ..Grants::NONE };
+        let grants = |setup: &Setup, helper, partner| -> Vec<Grants> {
+            let slots = agent_slots(setup, EpisodeAgents { helper, partner }, rules);
+            slots.iter().map(|slot| slot.grants).collect()
+        };
+        let mut alone = setup("high_target/test/02");
+        assert_eq!(grants(&alone, external(helper), None), [rule_based, helper]);
+        assert_eq!(grants(&alone, external(helper), external(other)), [other, helper]);
+        alone.people.truncate(1);
+        assert_eq!(grants(&alone, None, None), [rule_based]);
+        let mut crowd = setup("shopping/test/02");
+        assert_eq!(grants(&crowd, external(helper), None), [rule_based, helper, Grants::CHILD]);
+        crowd.people.push(crowd.people[0]);
+        let expected = [rule_based, helper, Grants::CHILD, Grants::NONE];
+        assert_eq!(grants(&crowd, external(helper), None), expected, "one stands still");
+    }
+
+    #[test]
+    fn a_start_sets_the_sensors_of_agents_in_the_environment_only() {
+        let setup = Arc::new(setup("high_target/test/02"));
+        let world = World::new(setup, Rules::default()).expect("a valid episode");
+        let sensors = SensorConfig { image_size: 64, rgb: true, ..SensorConfig::NONE };
+        let inside = AgentSlot::with_agent(Box::new(NoopAgent), Grants::NONE);
+        for (mut slot, image_size, expected) in [
+            (inside, Some(32), SensorConfig { image_size: 32, ..SensorConfig::NONE }),
+            (AgentSlot::external(Grants::IDS, sensors), Some(32), sensors),
+        ] {
+            assert_eq!(slot.agent().is_some(), expected != sensors);
+            slot.submitted = Some((Action::TurnLeft, Action::TurnLeft));
+            slot.reset(AgentId::HELPER, &world, 0, image_size);
+            assert_eq!((slot.sensors, slot.submitted), (expected, None));
+        }
+    }
+
+    #[test]
+    fn seeds_of_worlds_differ_in_all_bits_and_seed_0_is_that_of_the_episode() {
+        assert_eq!(world_seed(77, 0), 77);
+        assert_eq!(world_seed(77, 1), world_seed(77, 1));
+        assert_ne!(world_seed(77, 1), world_seed(78, 1));
+        let seeds: Vec<u64> = (1..=64).map(|seed| world_seed(77, seed)).collect();
+        for shift in [0, 16, 32, 48] {
+            let words: BTreeSet<u64> = seeds.iter().map(|seed| seed >> shift & 0xffff).collect();
+            assert!(words.len() > 60, "bits from {shift}: {words:?}");
+        }
+    }
+}

@@ -14,7 +14,8 @@ use serde::{Deserialize, Serialize};
 pub struct RewardWeights {
     /// Delivery of all wanted objects, by any agent.
     pub delivered: f64,
-    /// Delivery of all wanted objects by the agent itself; varies less with the partner's behavior.
+    /// Delivery of all wanted objects by the agent itself; varies less with the partner's behavior. A
+    /// delivery counts if fewer than the wanted number of its class were delivered before, by any agent.
     pub own_delivered: f64,
     /// Holding all objects still needed; taken back on delivery, on a drop and at the end of the
     /// episode.
@@ -161,7 +162,7 @@ impl RewardTracker {
 struct RewardTotals {
     /// Fraction of all wanted objects that is delivered, 0 to 1.
     delivered: f64,
-    /// Fraction that the agent itself delivered, of each class at most the wanted number.
+    /// Fraction that the agent itself delivered; those of all agents sum to `delivered`.
     own_delivered: f64,
     /// Fraction that the agent holds, in its hands or in a held container, of each class at most the
     /// number still needed.
@@ -178,28 +179,40 @@ impl RewardTotals {
         let (done, total) = world.progress();
         let fraction = |amount: f64| if total > 0.0 { amount / total } else { 0.0 };
         let n_objects = setup.things.len();
-        // Objects of one class beyond the wanted number earn nothing.
-        let amount = |is_counted: &dyn Fn(usize) -> bool, n_max: &dyn Fn(ClassId, u32) -> u32| {
-            let value = |(class, n_wanted): &(ClassId, u32)| {
-                let of_class = |k: &usize| setup.things[*k].class == *class;
-                let n = (0..n_objects).filter(of_class).filter(|k| is_counted(*k)).count() as u32;
-                f64::from(n.min(n_max(*class, *n_wanted))) * world.target_value(*class)
-            };
-            setup.goal.targets.iter().map(value).sum::<f64>()
+        let own = |(class, n_wanted): &(ClassId, u32)| {
+            let n = n_counted_deliveries(world, agent, *class, *n_wanted);
+            f64::from(n) * world.target_value(*class)
         };
-        let n_left = |class, n_wanted: u32| n_wanted.saturating_sub(world.n_delivered(class));
+        // Held objects of one class beyond the number still needed earn nothing.
+        let held = |(class, n_wanted): &(ClassId, u32)| {
+            let is_held =
+                |k: &usize| setup.things[*k].class == *class && holder(world, *k) == Some(agent);
+            let n = (0..n_objects).filter(is_held).count() as u32;
+            let n_left = n_wanted.saturating_sub(world.n_delivered(*class));
+            f64::from(n.min(n_left)) * world.target_value(*class)
+        };
         let distances = (0..n_objects).filter_map(|k| remaining_distance_m(world, agent, k));
         RewardTotals {
             delivered: fraction(done),
-            own_delivered: fraction(amount(
-                &|k| state.objects[k].delivered_by == Some(agent),
-                &|_, n_wanted| n_wanted,
-            )),
-            held: fraction(amount(&|k| holder(world, k) == Some(agent), &n_left)),
+            own_delivered: fraction(setup.goal.targets.iter().map(own).sum()),
+            held: fraction(setup.goal.targets.iter().map(held).sum()),
             emergency: f64::from(state.child_away_frames) / f64::from(setup.horizon.max(1)),
             remaining_m: distances.min_by(f32::total_cmp).map_or(0.0, f64::from),
         }
     }
+}
+
+/// Returns the number of objects of a class that an agent delivered while they were wanted: those among the
+/// first `n_wanted` deliveries by any agent. Deliveries of one frame count in the order of ids.
+fn n_counted_deliveries(world: &World, agent: AgentId, class: ClassId, n_wanted: u32) -> u32 {
+    let objects = world.setup().things.iter().zip(&world.state().objects);
+    let of_class = objects.filter(|(thing, _)| thing.class == class);
+    let mut deliveries: Vec<(Frame, Option<AgentId>)> =
+        of_class.filter_map(|(_, object)| Some((object.delivered?, object.delivered_by))).collect();
+    // A stable sort keeps the order of ids.
+    deliveries.sort_by_key(|(frame, _)| *frame);
+    let counted = deliveries.iter().take(n_wanted as usize);
+    counted.filter(|(_, by)| *by == Some(agent)).count() as u32
 }
 
 /// State at the start of an action.

@@ -291,6 +291,25 @@ mod tests {
     }
 
     #[test]
+    fn the_value_depends_on_the_features_of_all_candidates_but_not_on_their_order() {
+        let model = CandidateScorer::new(3, 2, 16, 1);
+        let parameters = model.network.init_parameters(1);
+        let value = |decision: &CandidateSet| {
+            model.forward(&parameters, std::iter::once(decision), &mut model.pass())[0].value()
+        };
+        let decision = decisions().remove(2);
+        for k in 0..decision.candidates.len() {
+            let mut changed = decision.clone();
+            changed.candidates[k] += 1.0;
+            let difference = (value(&changed) - value(&decision)).abs();
+            assert!(difference > 1e-5, "feature {k}: {difference}");
+        }
+        let mut reordered = decision.clone();
+        reordered.candidates.rotate_left(2);
+        assert!((value(&reordered) - value(&decision)).abs() < 1e-6);
+    }
+
+    #[test]
     fn inputs_are_normalized_by_running_statistics() {
         let model = CandidateScorer::new(3, 2, 16, 1);
         let mut parameters = model.network.init_parameters(1);

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use chaic_agents::behavior::BehaviorLog;
 use chaic_agents::decision::{Context, Plan, Policy};
 use chaic_agents::memory::Memory;
-use chaic_agents::policies::{InferOptions, InferPolicy, RulePolicy, RuleProfile};
+use chaic_agents::policies::{FollowPolicy, InferOptions, InferPolicy, RulePolicy, RuleProfile};
 use chaic_core::briefing::Goal;
 use chaic_core::geom::math;
 use chaic_core::rng::RngStream;
@@ -27,20 +27,34 @@ use crate::policy::{LearnedPolicy, StepLog, StepRecord};
 pub struct ExpertInfo {
     /// Name in configurations: that of the helper with the same rules.
     pub name: &'static str,
-    /// True if the expert knows the goal. Its choices then depend on what the learner cannot know, so
-    /// a clone cannot reach it.
+    /// True if the expert is granted the goal. Its choices then depend on what the learner cannot know,
+    /// so a clone cannot reach it.
     pub knows_goal: bool,
     /// Creates its policy.
     pub policy: fn() -> Box<dyn Policy>,
 }
 
-/// All experts.
-pub static EXPERTS: [ExpertInfo; 3] = [
+/// All experts: the rule-based helpers that choose among the learner's plans. Two built-in helpers need the
+/// granted state, which the learner's observations lack, and `random` draws its choices.
+pub static EXPERTS: [ExpertInfo; 8] = [
+    ExpertInfo { name: "infer", knows_goal: false, policy: || infer(InferOptions::ALL) },
     ExpertInfo {
-        name: "infer",
+        name: "infer_no_watching",
         knows_goal: false,
-        policy: || Box::new(InferPolicy::new(InferOptions::ALL)),
+        policy: || infer(InferOptions { follows_partner: false, ..InferOptions::ALL }),
     },
+    ExpertInfo {
+        name: "infer_no_planner",
+        knows_goal: false,
+        policy: || infer(InferOptions { uses_team_planner: false, ..InferOptions::ALL }),
+    },
+    ExpertInfo {
+        name: "infer_no_constraint",
+        knows_goal: false,
+        policy: || infer(InferOptions { infers_constraint: false, ..InferOptions::ALL }),
+    },
+    ExpertInfo { name: "infer_known_goal", knows_goal: true, policy: || infer(InferOptions::ALL) },
+    ExpertInfo { name: "follow", knows_goal: false, policy: || Box::<FollowPolicy>::default() },
     ExpertInfo {
         name: "rhp",
         knows_goal: false,
@@ -52,6 +66,10 @@ pub static EXPERTS: [ExpertInfo; 3] = [
         policy: || Box::new(RulePolicy::new(RuleProfile::ORACLE)),
     },
 ];
+
+fn infer(options: InferOptions) -> Box<dyn Policy> {
+    Box::new(InferPolicy::new(options))
+}
 
 impl ExpertInfo {
     /// Returns the expert with this name.
@@ -294,4 +312,52 @@ fn gradient(
     let logits = output.log_probs.iter().enumerate();
     let logits = logits.map(|(k, l)| weight * (math::exp(*l) - label(k))).collect();
     OutputGrad { logits, values: vec![0.5 * weight * error] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use chaic_agents::{HelperInfo, PlannerRules};
+    use chaic_nn::AdamWConfig;
+
+    #[test]
+    fn experts_are_built_in_helpers_with_the_same_knowledge() {
+        for ExpertInfo { name, knows_goal, .. } in &EXPERTS {
+            let helper = HelperInfo::find_helper(name).unwrap();
+            let grants = (helper.grants)(PlannerRules::paper());
+            assert!(grants.goal == *knows_goal && !grants.state, "{name}");
+        }
+    }
+
+    #[test]
+    fn a_long_episode_weighs_as_much_as_a_short_one() {
+        let model = CandidateScorer::new(3, 2, 16, 1);
+        let mut learner = Learner::new(&model.network, 1, 2);
+        let demonstration = |action| Demonstration {
+            observation: CandidateSet {
+                state: vec![0.5; 3],
+                candidates: vec![0.1, 0.2, 0.8, 0.9],
+                n_candidates: 2,
+                memory: Vec::new(),
+            },
+            action,
+            value_target: 0.0,
+        };
+        let (short, long) = (vec![demonstration(0)], vec![demonstration(1); 99]);
+        let adam = AdamWConfig::default();
+        let config = FitConfig {
+            // Without a learning rate, the network prefers the same candidate in all steps.
+            optimizer: Optimizer { adam: &adam, learning_rate: 0.0 },
+            label_smoothing: 0.0,
+            n_steps: 50,
+            batch_size: 40,
+            seed: 1,
+            iteration: 0,
+        };
+        let stop = AtomicBool::new(false);
+        let episodes = [&short[..], &[], &long[..]];
+        let metrics = fit(&config, &model, &mut learner, &episodes, &stop).unwrap();
+        // The standard deviation is 0.011.
+        assert!((metrics.agreement - 0.5).abs() < 0.06, "{metrics:?}");
+    }
 }

@@ -91,21 +91,118 @@ impl PlanHistory {
 /// Returns whether a learned policy may replace the unfinished plan `current` by `new`: as
 /// [`Plan::supersedes`], and also a walk by another walk and an idle plan by another idle plan.
 pub fn may_replace(new: &Plan, current: &Plan) -> bool {
-    let is_pick = |p: &Plan| matches!(p, Plan::PickUp(_) | Plan::PickContainer(_));
     let is_idle = |p: &Plan| matches!(p, Plan::Explore | Plan::FollowPartner | Plan::Wait);
     let is_exchange =
-        is_pick(new) && is_pick(current) || is_idle(new) && is_idle(current) && new != current;
+        new.is_pick() && current.is_pick() || is_idle(new) && is_idle(current) && new != current;
     new != current && (is_exchange || new.supersedes(current))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use chaic_agents::PlannerRules;
+    use chaic_agents::behavior::BehaviorLog;
     use chaic_agents::decision::Subject;
+    use chaic_agents::memory::Memory;
     use chaic_agents::track::TrackId;
+    use chaic_core::geom::Pose;
+    use chaic_core::observation::{Grants, SensorConfig};
+    use chaic_core::{AgentId, Observation, TaskId, Vec3};
+    use chaic_env::{AgentSlot, Env, EpisodeAgents, EpisodeConfig};
+    use chaic_episodes::find_episode;
+
+    fn subject(track: u32) -> Subject {
+        Subject { track: TrackId(track), class: ClassId::named("apple") }
+    }
 
     fn pick_up(track: u32) -> Plan {
-        Plan::PickUp(Subject { track: TrackId(track), class: ClassId::named("apple") })
+        Plan::PickUp(subject(track))
+    }
+
+    /// Returns the briefing and the first observation of a helper.
+    fn start(task: TaskId) -> (Briefing, Observation) {
+        let episode = find_episode(&format!("{task}/gen/40000001")).unwrap();
+        let sensors = SensorConfig { image_size: 32, ..SensorConfig::DEPTH_AND_IDS };
+        let helper = Some(AgentSlot::external(Grants::PLANNER, sensors));
+        let config =
+            EpisodeConfig { image_size: Some(32), ..EpisodeConfig::new(&episode, "learner") };
+        let mut env = Env::new(config, EpisodeAgents { helper, partner: None }).unwrap();
+        env.advance(None).unwrap();
+        let observation = env.observe(AgentId::HELPER).unwrap().clone();
+        (env.briefing(AgentId::HELPER), observation)
+    }
+
+    /// Asserts whether plans are reconsidered, given the frames since the last choice and whether the map
+    /// has changed.
+    fn check(briefing: &Briefing, memory: &Memory, expected: &[(Plan, Frame, bool, bool)]) {
+        let behavior = BehaviorLog::default();
+        for (plan, since, has_changed, is_due) in expected {
+            let mut history = PlanHistory::new(briefing);
+            history.record(*plan, memory.frame - since);
+            let context = Context { briefing, memory, behavior: &behavior, is_explored: false };
+            let found = history.begin_reconsideration(&context, plan, *has_changed);
+            assert_eq!(found, *is_due, "{plan:?} after {since} frames, changed: {has_changed}");
+            assert_eq!(history.reconsidered(), is_due.then_some(*plan));
+        }
+    }
+
+    #[test]
+    fn idle_plans_and_walks_are_reconsidered_at_their_intervals() {
+        let (briefing, _) = start(TaskId::LowTarget);
+        let mut memory = Memory::new(&briefing, PlannerRules::paper());
+        memory.frame = 1000;
+        for idle in [Plan::Explore, Plan::FollowPartner, Plan::Wait] {
+            let expected =
+                [(idle, 59, false, false), (idle, 60, false, true), (idle, 1, true, true)];
+            check(&briefing, &memory, &expected);
+        }
+        for walk in [pick_up(1), Plan::PickContainer(subject(2))] {
+            let expected =
+                [(walk, 79, true, false), (walk, 80, true, true), (walk, 900, false, false)];
+            check(&briefing, &memory, &expected);
+        }
+        let others = [
+            Plan::Deliver,
+            Plan::PutIn,
+            Plan::TurnAround,
+            Plan::FollowChild,
+            Plan::LiftWith(subject(3)),
+            Plan::RemoveObstacle(subject(4)),
+        ];
+        check(&briefing, &memory, &others.map(|plan| (plan, 900, true, false)));
+    }
+
+    #[test]
+    fn in_moving_house_all_walks_are_reconsidered_sooner() {
+        let (briefing, _) = start(TaskId::MovingHouse);
+        let mut memory = Memory::new(&briefing, PlannerRules::paper());
+        memory.frame = 1000;
+        for plan in [Plan::Explore, pick_up(1), Plan::RemoveObstacle(subject(4))] {
+            let expected =
+                [(plan, 39, false, false), (plan, 40, false, true), (plan, 1, true, true)];
+            check(&briefing, &memory, &expected);
+        }
+        for plan in [Plan::Deliver, Plan::LiftWith(subject(3)), Plan::PutIn] {
+            check(&briefing, &memory, &[(plan, 900, true, false)]);
+        }
+    }
+
+    #[test]
+    fn a_child_that_is_away_makes_all_walks_urgent() {
+        let (briefing, mut observation) = start(TaskId::Shopping);
+        let mut memory = Memory::new(&briefing, PlannerRules::paper());
+        memory.frame = 1000;
+        observation.frame = 1000;
+        let pose = |x| Pose { position: Vec3::new(x, 0.0, 0.0), yaw_rad: 0.0 };
+        for (child_x_m, is_away) in [(1.0, false), (9.0, true)] {
+            observation.granted.poses =
+                vec![(AgentId::PARTNER, pose(0.0)), (AgentId::CHILD, pose(child_x_m))];
+            memory.people.update(&briefing, &observation, &[]);
+            for plan in [Plan::Deliver, pick_up(1)] {
+                check(&briefing, &memory, &[(plan, 39, false, false), (plan, 40, false, is_away)]);
+            }
+            check(&briefing, &memory, &[(Plan::FollowChild, 900, true, false)]);
+        }
     }
 
     #[test]

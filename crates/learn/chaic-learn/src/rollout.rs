@@ -13,8 +13,8 @@ use chaic_core::{AgentError, AgentId, Frame};
 use chaic_env::helper_registry::{BuiltInHelpers, Helper, find_partner};
 use chaic_env::rules::RuleSet;
 use chaic_env::{
-    AdvanceOutcome, Env, EnvError, EpisodeAgents, EpisodeConfig, RewardTracker, RewardWeights,
-    seeded_by_episode,
+    AdvanceOutcome, Appearance, Env, EnvError, EpisodeAgents, EpisodeConfig, RewardTracker,
+    RewardWeights, seeded_by_episode,
 };
 use chaic_episodes::{SplitError, find_episode};
 use rayon::prelude::*;
@@ -62,12 +62,14 @@ pub struct RolloutEpisode {
     pub id: String,
     /// Name of a partner that deviates from the rules; `None` for the rule-based one.
     pub partner: Option<String>,
+    /// Light and colors.
+    pub appearance: Appearance,
 }
 
 impl RolloutEpisode {
-    /// Episode with the rule-based partner.
+    /// Episode with the rule-based partner and the canonical appearance.
     pub fn new(id: impl Into<String>) -> RolloutEpisode {
-        RolloutEpisode { id: id.into(), partner: None }
+        RolloutEpisode { id: id.into(), partner: None, appearance: Appearance::Canonical }
     }
 
     /// Creates the environment of a helper.
@@ -76,6 +78,7 @@ impl RolloutEpisode {
         let config = EpisodeConfig {
             image_size: Some(image_size),
             partner: self.partner.as_deref(),
+            appearance: self.appearance,
             ..EpisodeConfig::new(&episode, "learner")
         };
         let name = self.partner.as_deref();
@@ -203,6 +206,11 @@ pub fn rollout(
     Ok(Some(EpisodeResult { trajectory, tr: recording.tr, frames: recording.frames }))
 }
 
+/// Returns whether the learner drives an episode, with probability `learner_fraction`.
+fn learner_drives(id: &str, learner_fraction: f32) -> bool {
+    RngStream::new(0, id, 0).chance(learner_fraction)
+}
+
 /// Plays an episode in which the expert labels the decisions, driven by the expert or, with
 /// probability `learner_fraction`, by the network. Returns the demonstrations and the transport
 /// rate; `None` if it was stopped.
@@ -217,8 +225,7 @@ pub fn rollout_with_expert(
     learner_fraction: f32,
 ) -> Result<Option<(Vec<Demonstration>, f64)>, RolloutError> {
     let recording = record_episode(episode, context, weights.grants(), |goal, log| {
-        let mut rng = RngStream::new(0, &episode.id, 0);
-        let actor = if rng.chance(learner_fraction) {
+        let actor = if learner_drives(&episode.id, learner_fraction) {
             let learner = LearnedPolicy::new(Arc::clone(weights), context.selection, None);
             RolloutActor::Learner(Box::new(learner))
         } else {
@@ -267,6 +274,17 @@ pub fn rollout_all(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_learner_drives_its_fraction_of_the_episodes() {
+        let n_driven = |learner_fraction| {
+            let ids = (0..1000).map(|seed| format!("low_target/gen/{}", 40_000_000 + seed));
+            ids.filter(|id| learner_drives(id, learner_fraction)).count()
+        };
+        assert_eq!([n_driven(0.0), n_driven(1.0)], [0, 1000]);
+        // The standard deviation is 14.
+        assert!((630..=770).contains(&n_driven(0.7)), "{}", n_driven(0.7));
+    }
 
     #[test]
     fn rewards_between_decisions_are_discounted_to_the_first() {

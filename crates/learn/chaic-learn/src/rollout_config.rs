@@ -8,9 +8,9 @@ use chaic_agents::partners::{PARTNER_VARIANTS, partner_habits};
 use chaic_agents::perception_factory::{GROUND_TRUTH, PerceptionFactory};
 use chaic_core::TaskId;
 use chaic_core::rng::RngStream;
-use chaic_env::RewardWeights;
 use chaic_env::helper_registry::{RULES, built_in};
 use chaic_env::rules::RuleSet;
+use chaic_env::{Appearance, RewardWeights};
 use chaic_episodes::{SeedRange, find_episode};
 use chaic_files::read_user_file;
 use chaic_training::bounds::{Bound, BoundTable, integer, real};
@@ -53,6 +53,32 @@ const REWARD_BOUNDS: BoundTable = &[
 /// Bounds of the weight of one reward term.
 pub(crate) const REWARD: Bound = real(-1000.0, 1000.0);
 
+/// Light and colors of training episodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TrainingAppearance {
+    /// Appearance of the benchmark.
+    Canonical,
+    /// Random appearance for each episode (domain randomization), drawn from the episode's id.
+    Varied,
+}
+
+/// Number of random appearances, as in the training of the detector.
+const N_APPEARANCES: usize = 1 << 24;
+
+impl TrainingAppearance {
+    /// Returns the appearance of an episode.
+    pub(crate) fn of_episode(self, id: &str) -> Appearance {
+        match self {
+            TrainingAppearance::Canonical => Appearance::Canonical,
+            TrainingAppearance::Varied => {
+                let mut rng = RngStream::new(0, &format!("appearance of {id}"), 0);
+                Appearance::Varied { seed: rng.below(N_APPEARANCES) as u64 }
+            }
+        }
+    }
+}
+
 /// Configuration of rollouts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -74,6 +100,8 @@ pub struct RolloutConfig {
     pub perception: String,
     /// Behavior recognition of the helper, as `chaic eval --behavior`.
     pub behavior: String,
+    /// Light and colors of training episodes. Validation has the canonical ones.
+    pub appearance: TrainingAppearance,
     /// Weights of an opponent model (`chaic train opponent`) whose predictions the policy reads, if
     /// any.
     pub opponent: Option<PathBuf>,
@@ -102,6 +130,7 @@ impl Default for RolloutConfig {
             image_size: 256,
             perception: GROUND_TRUTH.to_owned(),
             behavior: GROUND_TRUTH.to_owned(),
+            appearance: TrainingAppearance::Canonical,
             opponent: None,
             infer_hint: false,
             n_past_decisions: 0,
@@ -172,7 +201,8 @@ impl RolloutConfig {
                 let rng = RngStream::new(seed, "episodes", index);
                 let id = draw_episode(task, split, rng);
                 let partner = (partner != RULES).then(|| partner.clone());
-                RolloutEpisode { id, partner }
+                let appearance = self.appearance.of_episode(&id);
+                RolloutEpisode { id, partner, appearance }
             })
             .collect()
     }
@@ -273,8 +303,8 @@ pub(crate) struct Validation<'a> {
 }
 
 impl Validation<'_> {
-    /// Returns the mean transport rates, and the mean difference to the baseline with its standard
-    /// error; `None` if `stop` is raised.
+    /// Returns the mean transport rates of a policy and the metrics of [`Validation::compare`]; `None` if
+    /// `stop` is raised.
     pub fn run(
         &self,
         config: &RolloutConfig,
@@ -292,11 +322,25 @@ impl Validation<'_> {
         };
         let sampled = rates(ActionSelection::HELPER)?;
         let greedy = rates(ActionSelection::Greedy)?;
+        let mut named = self.compare(&sampled, &episodes, config.image_size, stop)?;
+        named.extend(metrics([(VALIDATION_TR, mean(&sampled)), ("tr_greedy", mean(&greedy))]));
+        Some(named)
+    }
+
+    /// Returns the mean transport rate of the baseline, and the mean difference of these rates from it with
+    /// its standard error; `None` if `stop` is raised.
+    pub fn compare(
+        &self,
+        rates: &[f64],
+        episodes: &[RolloutEpisode],
+        image_size: u32,
+        stop: &AtomicBool,
+    ) -> Option<Metrics> {
         if self.baseline.get().is_none() {
             let rate = |episode: &RolloutEpisode| {
                 let helper = built_in(BASELINE, RuleSet::PAPER.planner, self.perception);
                 let helper = helper.expect("it is a built-in helper");
-                let rate = episode.play(helper, config.image_size, stop);
+                let rate = episode.play(helper, image_size, stop);
                 rate.expect("generated episodes can be played")
             };
             let rates: Option<Vec<f64>> = episodes.par_iter().map(rate).collect();
@@ -304,13 +348,11 @@ impl Validation<'_> {
             let _ = self.baseline.set(rates?);
         }
         let baseline = self.baseline.get().expect("it was set above");
-        let gains: Vec<f64> = sampled.iter().zip(baseline).map(|(a, b)| a - b).collect();
+        let gains: Vec<f64> = rates.iter().zip(baseline).map(|(a, b)| a - b).collect();
         let gain = mean(&gains);
         let variance = gains.iter().map(|x| (x - gain) * (x - gain)).sum::<f64>()
             / (gains.len().max(2) - 1) as f64;
         Some(metrics([
-            (VALIDATION_TR, mean(&sampled)),
-            ("tr_greedy", mean(&greedy)),
             ("tr_baseline", mean(baseline)),
             ("gain", gain),
             ("gain_se", (variance / gains.len().max(1) as f64).sqrt()),
@@ -329,11 +371,65 @@ pub(crate) fn mean_tr(results: &[EpisodeResult]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::BTreeSet;
 
     #[test]
     fn the_search_for_validation_episodes_can_be_stopped() {
         let ids = |n, stop| validation_ids(TaskId::LowTarget, "gen", n, &AtomicBool::new(stop));
         assert_eq!(ids(2, false).map(|ids| ids.len()), Some(2));
         assert_eq!(ids(2, true), None);
+    }
+
+    #[test]
+    fn tasks_generators_and_partners_take_turns() {
+        let config = RolloutConfig {
+            episodes: 4,
+            tasks: vec![TaskId::LowTarget, TaskId::Shopping],
+            partners: vec![RULES.to_owned(), "slow".to_owned()],
+            ..RolloutConfig::default()
+        };
+        let episodes: Vec<RolloutEpisode> =
+            (0..2).flat_map(|iteration| config.sample_episodes(1, iteration)).collect();
+        let kind = |episode: &RolloutEpisode| {
+            let (kind, _) = episode.id.rsplit_once('/').unwrap();
+            (kind.to_owned(), episode.partner.clone())
+        };
+        let kinds: Vec<(String, Option<String>)> = episodes.iter().map(kind).collect();
+        let expected = [
+            ("low_target/gen", None),
+            ("shopping/gen", None),
+            ("low_target/gen-standard", None),
+            ("shopping/gen-standard", None),
+            ("low_target/gen", Some("slow")),
+            ("shopping/gen", Some("slow")),
+            ("low_target/gen-standard", Some("slow")),
+            ("shopping/gen-standard", Some("slow")),
+        ];
+        let expected =
+            expected.map(|(kind, partner)| (kind.to_owned(), partner.map(str::to_owned)));
+        assert_eq!(kinds, expected);
+        let ids: BTreeSet<&str> = episodes.iter().map(|episode| &*episode.id).collect();
+        assert_eq!(ids.len(), episodes.len(), "every episode is another one");
+    }
+
+    #[test]
+    fn varied_episodes_have_an_appearance_each() {
+        let config = |appearance| RolloutConfig {
+            episodes: 4,
+            tasks: vec![TaskId::LowTarget],
+            appearance,
+            ..RolloutConfig::default()
+        };
+        let canonical = config(TrainingAppearance::Canonical).sample_episodes(1, 0);
+        assert!(canonical.iter().all(|episode| episode.appearance == Appearance::Canonical));
+        let varied = config(TrainingAppearance::Varied).sample_episodes(1, 0);
+        let names: BTreeSet<String> =
+            varied.iter().map(|episode| episode.appearance.to_string()).collect();
+        assert!(names.len() == 4 && names.iter().all(|name| name.starts_with("varied:")));
+        let ids = |episodes: &[RolloutEpisode]| -> Vec<String> {
+            episodes.iter().map(|episode| episode.id.clone()).collect()
+        };
+        assert_eq!(ids(&varied), ids(&canonical));
+        assert_eq!(varied, config(TrainingAppearance::Varied).sample_episodes(1, 0));
     }
 }

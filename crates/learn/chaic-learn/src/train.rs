@@ -361,7 +361,9 @@ impl Algorithm for PpoTrainingConfig {
     }
 
     fn read_data(&self, folder: &Path, state: &TrainState) -> Result<Option<Vec<f32>>, String> {
-        read_reference(&self.ppo, folder, &state.model.network, &state.kind.name())
+        read_reference(&self.ppo, folder, |bytes| {
+            weights::from_bytes(&state.model.network, bytes, &state.kind.name())
+        })
     }
 
     fn iterate(
@@ -397,15 +399,14 @@ impl Algorithm for PpoTrainingConfig {
 }
 
 /// Reads the parameters of the initial policy from the folder of a training; `None` if no KL penalty
-/// refers to them. `kind` is that of the weights file.
+/// refers to them. `parse` reads those of a weights file.
 ///
 /// # Errors
 /// One line, if the training has no initial weights, or they cannot be read.
 pub(crate) fn read_reference(
     config: &PpoConfig,
     folder: &Path,
-    network: &Network,
-    kind: &str,
+    parse: impl FnOnce(&[u8]) -> Result<Vec<f32>, WeightsError>,
 ) -> Result<Option<Vec<f32>>, String> {
     if config.kl_coef == 0.0 {
         return Ok(None);
@@ -415,8 +416,7 @@ pub(crate) fn read_reference(
         return Err("`ppo.kl_coef` above 0 needs initial weights; give --weights".to_owned());
     }
     let bytes = read_bounded(&path, MAX_WEIGHTS_BYTES).map_err(|e| e.to_string())?;
-    let parameters = weights::from_bytes(network, &bytes, kind);
-    parameters.map(Some).map_err(|problem| format!("{}: {problem}", path.display()))
+    parse(&bytes).map(Some).map_err(|problem| format!("{}: {problem}", path.display()))
 }
 
 /// Expert of `chaic train clone`.

@@ -353,6 +353,16 @@ fn a_training_that_is_cut_short_has_the_weights_of_its_last_step() {
 }
 
 #[test]
+fn a_training_shorter_than_the_validation_interval_validates_at_its_end() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut records = Vec::new();
+    let mut run = start(dir.path(), &ToyConfig { steps: 5, ..ToyConfig::default() });
+    assert!(run_to_end(&mut run, &mut |record, _| records.push((record.phase, record.step))));
+    assert_eq!(records.last(), Some(&(Phase::Validation, 5)));
+    assert!(dir.path().join(<Toy>::WEIGHTS).exists());
+}
+
+#[test]
 fn a_second_process_in_a_folder_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     let run = start(dir.path(), &ToyConfig::default());
@@ -434,16 +444,16 @@ fn a_training_that_is_stopped_before_its_first_step_keeps_its_initial_weights() 
 
 #[test]
 fn non_finite_weights_are_not_written() {
-    for (breaks_at, kept) in [(12, 10), (15, 10), (16, 15)] {
+    // The checkpoint after step 15 and the validation after step 16 find them.
+    for (breaks_at, found_at, kept) in [(12, 15, 10), (15, 15, 10), (16, 16, 15)] {
         let dir = tempfile::tempdir().unwrap();
         let mut run = start(dir.path(), &ToyConfig { breaks_at, ..ToyConfig::default() });
         let error = run.run(&AtomicBool::new(false), &mut |_| ()).unwrap_err();
         let is_reported =
             matches!(error, TrainingError::NotFinite { .. } | TrainingError::NonFiniteMetric(_));
-        assert!(
-            is_reported && error.to_string().contains("the last checkpoint is kept"),
-            "{error}"
-        );
+        let message = error.to_string();
+        assert!(is_reported && message.contains("the last checkpoint is kept"), "{message}");
+        assert!(message.contains(&format!("step {found_at}")), "{message}");
         drop(run);
         let weights = fs::read(dir.path().join(<Toy>::WEIGHTS)).unwrap();
         assert!(<Toy>::read_weights(&ToyConfig::default(), &weights).is_ok());

@@ -1,9 +1,12 @@
 //! Grouping of pixels to instances: connected pixels of one label that vote for one center.
 
+mod join;
+
 use chaic_core::geom::Camera;
 use chaic_nn::Tensor;
 use chaic_nn::simd::widest;
 
+use self::join::join;
 use crate::detector::{N_OFFSETS, STRIDE};
 use crate::labels::{BACKGROUND, class_of, half_extents_m};
 use crate::loss::exp;
@@ -100,6 +103,24 @@ impl InstanceConfig {
         min_pixels: 5,
         ignores_labels: false,
     };
+
+    /// Returns whether a part belongs to the object of a larger segment, given the half extents of
+    /// all labels in meters.
+    fn is_same_object(&self, half_extents: &[f32], segment: &Segment, part: &Segment) -> bool {
+        let distance_m = distance(segment.center, part.center);
+        let [half, other] = [part, segment].map(|s| half_extents[usize::from(s.label)]);
+        if segment.label == part.label {
+            distance_m < self.join_extents * half
+        } else {
+            distance_m < self.relabel_extents * other.min(half)
+        }
+    }
+
+    /// Returns an upper bound of the distance from a segment of this label to parts of the same
+    /// object, meters.
+    fn reach_m(&self, half_extents: &[f32], label: u8) -> f32 {
+        self.join_extents.max(self.relabel_extents) * half_extents[usize::from(label)]
+    }
 }
 
 impl Default for InstanceConfig {
@@ -208,7 +229,7 @@ impl Pixels {
     }
 
     /// Appends rows of the head's output, shape [rows, width, channels], starting at `first_row`.
-    /// Depth is that of the whole image.
+    /// Depth is that of the whole image; [`Camera::FAR_M`] replaces values that are not finite.
     ///
     /// # Panics
     /// If the shapes do not fit, or rows are missing or out of order.
@@ -319,37 +340,40 @@ impl Pixels {
         }
         // The largest part comes first and determines the label; smaller ones join it.
         parts.sort_by_key(|part| (std::cmp::Reverse(part.len()), part[0]));
-        let mut segments: Vec<Segment> = Vec::new();
-        for part in parts {
+        let segment = |part: Vec<u32>| {
             let label = if config.ignores_labels {
                 majority_label(pixels, &part)
             } else {
                 pixels[part[0] as usize].label
             };
-            let center = median_vote(pixels, &part);
-            let max_distance_m = config.join_extents * half_extents[usize::from(label)];
-            let is_same_object = |other: u8, distance_m: f32| match other == label {
-                true => distance_m < max_distance_m,
-                false => {
-                    let half =
-                        half_extents[usize::from(other)].min(half_extents[usize::from(label)]);
-                    distance_m < config.relabel_extents * half
-                }
-            };
-            let existing =
-                segments.iter_mut().find(|s| is_same_object(s.label, distance(s.center, center)));
-            match existing {
-                Some(segment) => segment.pixels.extend(part),
-                None => segments.push(Segment { label, score: 0.0, pixels: part, center }),
-            }
-        }
+            Segment { label, score: 0.0, center: median_vote(pixels, &part), pixels: part }
+        };
+        let mut segments = join(
+            parts.into_iter().map(segment).collect(),
+            |segment| config.reach_m(half_extents, segment.label),
+            |segment, part| config.is_same_object(half_extents, segment, part),
+        );
         segments.retain(|segment| segment.pixels.len() >= config.min_pixels);
         for segment in &mut segments {
-            let probability = |k: &u32| pixels[*k as usize].probability;
-            let sum: f32 = segment.pixels.iter().map(probability).sum();
-            segment.score = sum / segment.pixels.len() as f32;
+            segment.score = self.mean_probability(&segment.pixels);
         }
         segments
+    }
+
+    /// Returns the mean probability of the labels of some pixels.
+    fn mean_probability(&self, members: &[u32]) -> f32 {
+        let sum: f32 = members.iter().map(|k| self.pixels[*k as usize].probability).sum();
+        sum / members.len() as f32
+    }
+
+    /// Returns the segment of these pixels, at least one, with the label that most of them show.
+    pub fn segment_of(&self, pixels: Vec<u32>) -> Segment {
+        Segment {
+            label: majority_label(&self.pixels, &pixels),
+            score: self.mean_probability(&pixels),
+            center: median_vote(&self.pixels, &pixels),
+            pixels,
+        }
     }
 
     /// Returns masks of disjoint segments at full resolution, as row-major indices in ascending
@@ -417,6 +441,7 @@ fn decode(
         let (k, offset) = (first + k, &output[n_labels..]);
         let (x, y) = (STRIDE * (k % columns), STRIDE * (k / columns));
         let depth = depth_m[y * width + x];
+        let depth = if depth.is_finite() { depth } else { Camera::FAR_M };
         let (u, v) = (x as f32 + 0.5 - half[0], y as f32 + 0.5 - half[1]);
         let point = [u / focal * depth, -v / focal * depth, -depth];
         let scale = half_extents[usize::from(label)];

@@ -88,6 +88,7 @@ impl Perception for LearnedPerception {
         self.tracking.tracker.update_hands(hands, last);
     }
 
+    /// Images that are missing or of another size show nothing.
     fn perceive(&mut self, observation: &Observation) -> Percepts {
         self.tracking.last.clear();
         let camera = &observation.camera;
@@ -126,7 +127,7 @@ impl Perception for LearnedPerception {
 
 /// Names each instance by the class of the object that most of its pixels show, in an image of ids;
 /// drops instances of structure. Scores stay as they are.
-fn with_true_names(
+pub fn with_true_names(
     instances: Vec<Instance>,
     ids: &[u16],
     class_of: impl Fn(EntityId) -> Option<ClassId>,
@@ -218,7 +219,53 @@ fn measure(
 
 #[cfg(test)]
 mod tests {
+    use chaic_core::Vec3;
+    use chaic_core::geom::{Pose, yaw_rotation};
+    use chaic_core::observation::{Granted, Images, Proprioception};
+
     use super::*;
+
+    #[test]
+    fn images_of_another_size_show_nothing() {
+        let factory = LearnedPerceptionFactory::new(TrainedDetector::built_in());
+        let refused = factory.check_image_size(65).unwrap_err();
+        assert!(refused.contains("multiple of 32, not 65"), "{refused}");
+        let observation = |[width, height]: [u32; 2], images: Images| Observation {
+            frame: 0,
+            proprioception: Proprioception {
+                pose: Pose::default(),
+                hands: [None, None],
+                last: None,
+                other_end: None,
+            },
+            camera: Camera {
+                eye_in_world: Vec3::new(0.0, 1.6, 0.0),
+                world_from_camera: yaw_rotation(0.0),
+                vertical_fov_rad: Camera::EYE_FOV_RAD,
+                width,
+                height,
+            },
+            images,
+            frame_history: Vec::new(),
+            granted: Granted::default(),
+        };
+        let images = |n: usize, n_depth: usize| Images {
+            rgb: Some(vec![100; 3 * n]),
+            depth_m: Some(vec![2.0; n_depth]),
+            ids: None,
+        };
+        let mut perception = factory.perception();
+        for (size, images) in [
+            ([65, 64], images(65 * 64, 65 * 64)),
+            ([64, 64], images(64 * 64, 64 * 63)),
+            ([64, 64], images(64 * 63, 64 * 64)),
+            ([0, 0], images(0, 0)),
+            ([64, 64], Images::default()),
+        ] {
+            let percepts = perception.perceive(&observation(size, images));
+            assert!(percepts.detections.is_empty(), "{size:?}");
+        }
+    }
 
     #[test]
     fn true_names_are_those_of_most_pixels() {

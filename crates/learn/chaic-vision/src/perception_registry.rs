@@ -39,12 +39,22 @@ pub enum PerceptionError {
     #[error(transparent)]
     File(#[from] FileError),
     /// The file holds no weights of this network.
-    #[error("{}: {problem}", path.display())]
+    #[error("{}: {problem}; use weights that `chaic train` of this version wrote", path.display())]
     Weights {
         /// Path of the file.
         path: PathBuf,
         /// Cause.
         problem: WeightsError,
+    },
+    /// The file holds the first stage of a detector, which is no perception of helpers.
+    #[error(
+        "{file}: the detector lacks its second stage; train it with `chaic train detection --weights \
+         {file} --set steps=0`",
+        file = path.display()
+    )]
+    OneStage {
+        /// Path of the file.
+        path: PathBuf,
     },
     /// The file holds no error rates.
     #[error("{}: {problem}", path.display())]
@@ -66,13 +76,25 @@ fn file_of<'a>(name: &'a str, kind: &str) -> Option<&'a Path> {
     name.strip_prefix(kind)?.strip_prefix(':').map(Path::new)
 }
 
-/// Reads a detector from a file.
+/// Reads a detector of one or two stages from a file.
 ///
 /// # Errors
 /// If the file cannot be read or holds no detector.
 pub fn read_detector(path: &Path) -> Result<TrainedDetector, PerceptionError> {
     let weights_error = |problem| PerceptionError::Weights { path: path.to_owned(), problem };
     TrainedDetector::from_bytes(&read_user_file(path, MAX_BYTES)?).map_err(weights_error)
+}
+
+/// Reads a detector for helpers from a file.
+///
+/// # Errors
+/// As [`read_detector`], and if the detector has one stage only, as between the two trainings.
+fn read_complete_detector(path: &Path) -> Result<TrainedDetector, PerceptionError> {
+    let detector = read_detector(path)?;
+    match detector.second_stage {
+        Some(_) => Ok(detector),
+        None => Err(PerceptionError::OneStage { path: path.to_owned() }),
+    }
 }
 
 /// Reads a behavior network from a file.
@@ -117,14 +139,14 @@ fn factory_from_name(name: &str) -> Result<Arc<dyn PerceptionFactory>, Perceptio
         return Ok(Arc::new(LearnedPerceptionFactory::new(TrainedDetector::built_in())));
     }
     if let Some(file) = weights_of(name) {
-        return Ok(Arc::new(LearnedPerceptionFactory::new(read_detector(file)?)));
+        return Ok(Arc::new(LearnedPerceptionFactory::new(read_complete_detector(file)?)));
     }
     if name == GT_NAMES {
         let detector = TrainedDetector::built_in();
         return Ok(Arc::new(LearnedPerceptionFactory::with_true_names(detector)));
     }
     if let Some(file) = file_of(name, GT_NAMES) {
-        let detector = read_detector(file)?;
+        let detector = read_complete_detector(file)?;
         return Ok(Arc::new(LearnedPerceptionFactory::with_true_names(detector)));
     }
     if name == GT_MASKS {
@@ -153,4 +175,41 @@ fn factory_from_name(name: &str) -> Result<Arc<dyn PerceptionFactory>, Perceptio
         "no perception `{name}`; write {GROUND_TRUTH}, {GT_TRACKS}, {GT_MASKS}, {GT_NAMES}, \
          {GT_NAMES}:FILE, {LEARNED}, {LEARNED}:FILE, {NOISY} or {NOISY}:FILE"
     )))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_that_hold_no_complete_detector_are_refused_in_one_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("weights.safetensors");
+        let refused = |bytes: Option<&[u8]>, words: &str| {
+            if let Some(bytes) = bytes {
+                std::fs::write(&path, bytes).unwrap();
+            }
+            for kind in [LEARNED, GT_NAMES] {
+                let name = format!("{kind}:{}", path.display());
+                let problem = perception_from_name(&name, GROUND_TRUTH).err().expect(words);
+                let problem = problem.to_string();
+                let names_file = problem.contains("weights.safetensors");
+                let is_clear = names_file && problem.contains(words) && !problem.contains('\n');
+                assert!(is_clear, "{words}: {problem}");
+            }
+        };
+        refused(None, "weights.safetensors");
+        let complete = TrainedDetector::built_in();
+        let bytes = complete.to_bytes().unwrap();
+        refused(Some(&bytes[..bytes.len() / 2]), "not a weights file");
+        let behavior = TrainedBehavior::built_in().to_bytes().unwrap();
+        refused(Some(&behavior), "weights of `chaic behavior 1`, expected `chaic detector 2");
+        let one_stage = TrainedDetector { second_stage: None, ..complete };
+        refused(Some(&one_stage.to_bytes().unwrap()), "lacks its second stage; train it with");
+        // Evaluations and trainings between the two stages read it.
+        assert!(read_detector(&path).unwrap().second_stage.is_none());
+        std::fs::write(&path, &bytes).unwrap();
+        let name = format!("{LEARNED}:{}", path.display());
+        assert!(perception_from_name(&name, GROUND_TRUTH).is_ok());
+    }
 }

@@ -12,7 +12,7 @@ use chaic_nn::{Pass, Shape, Tensor};
 
 use crate::average_precision::average_precision;
 use crate::coco::results;
-use crate::detector::{Detector, N_OFFSETS, STRIDE};
+use crate::detector::{N_OFFSETS, STRIDE};
 use crate::evaluate::{MIN_AREA_PX, compare, report};
 use crate::features::{ImageCrop, N_FEATURES, features};
 use crate::instances::{Instance, InstanceConfig, Pixels, instances};
@@ -259,22 +259,6 @@ fn a_training_writes_a_checkpoint_and_readable_weights() {
     let error =
         TrainingRun::<DetectorLearner>::resume(&out, quiet, &NEVER_STOP).err().unwrap().to_string();
     assert!(error.contains("stepps"), "{error}");
-}
-
-#[test]
-fn invalid_images_give_valid_scores() {
-    let detector = Detector::new();
-    let trained = TrainedDetector::uncalibrated(&detector, &detector.network.init_parameters(1));
-    let mut inference = trained.inference();
-    let camera = camera(64);
-    for depth_m in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, -1.0, 2.0] {
-        for gray in [0, 255] {
-            let (rgb, depth_m) = (vec![gray; 3 * 64 * 64], vec![depth_m; 64 * 64]);
-            let found = trained.detect(&rgb, &depth_m, &camera, &mut inference);
-            assert!(found.iter().all(|f| (0.0..=1.0).contains(&f.score())));
-        }
-    }
-    assert!(!trained.fits(&Camera { width: 65, ..camera }));
 }
 
 #[test]

@@ -81,7 +81,10 @@ pub struct TrackReport {
     pub detection_recall_by_m: BTreeMap<u32, Rate>,
     /// The same for all distances up to 10 m.
     pub detection_recall: Rate,
-    /// Fraction of objects in memory at the end that were seen at their place.
+    /// Fraction of objects in memory at the end that were seen at their place, by the smallest distance
+    /// from which their track was detected in meters.
+    pub memory_precision_by_m: BTreeMap<u32, Rate>,
+    /// The same for all distances, also those beyond 10 m.
     pub memory_precision: Rate,
     /// Fraction of the objects seen with enough pixels that are in memory at the end, by the smallest
     /// distance from which they were seen in meters.
@@ -184,6 +187,14 @@ struct Sighting {
     position_in_world: Vec3,
 }
 
+/// Object in memory at the end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct RememberedObject {
+    sighting: Sighting,
+    /// Smallest distance from which its track was detected; infinite if it never was.
+    nearest_m: f32,
+}
+
 /// Sightings of an object with known id.
 #[derive(Clone, Copy, Debug)]
 struct TrueObject {
@@ -208,8 +219,10 @@ struct EpisodeRecord {
     /// Objects that the helper has held: their ids, and their tracks.
     held: BTreeSet<EntityId>,
     held_tracks: BTreeSet<TrackId>,
+    /// Smallest distance of the detections of each track, meters.
+    detected_m: BTreeMap<TrackId, f32>,
     /// Evaluated objects in memory, at the end.
-    memory: Vec<Sighting>,
+    memory: Vec<RememberedObject>,
 }
 
 impl EpisodeRecord {
@@ -226,8 +239,11 @@ impl EpisodeRecord {
         let Some(ids) = &observation.images.ids else { return };
         self.n_images += 1;
         let width = observation.camera.width as usize;
+        let eye = observation.camera.eye_in_world;
         let mut track_of: BTreeMap<EntityId, TrackId> = BTreeMap::new();
         for detection in &percepts.detections {
+            let nearest_m = self.detected_m.entry(detection.track).or_insert(f32::INFINITY);
+            *nearest_m = nearest_m.min(eye.distance(detection.position_in_world));
             if detection.person.is_some() || !self.is_evaluated(detection.class) {
                 continue;
             }
@@ -240,7 +256,6 @@ impl EpisodeRecord {
                 track_of.insert(entity, detection.track);
             }
         }
-        let eye = observation.camera.eye_in_world;
         for truth in GroundTruthIds.perceive(observation).detections {
             let entity = u16::try_from(truth.track.0).map(EntityId);
             let Ok(entity) = entity else { continue };
@@ -269,7 +284,7 @@ impl EpisodeRecord {
     /// in memory, its true object.
     fn matches(&self) -> Vec<Option<EntityId>> {
         let mut pairs: Vec<(f32, usize, EntityId)> = Vec::new();
-        for (k, remembered) in self.memory.iter().enumerate() {
+        for (k, RememberedObject { sighting: remembered, .. }) in self.memory.iter().enumerate() {
             for (entity, truth) in &self.objects {
                 let distance_m =
                     horizontal_distance(remembered.position_in_world, truth.last.position_in_world);
@@ -288,6 +303,17 @@ impl EpisodeRecord {
             }
         }
         matches
+    }
+
+    /// Numbers of objects in memory that were seen at their place, and of all in memory, within a range
+    /// of distance.
+    fn memory_precision(&self, range_m: [f32; 2]) -> [usize; 2] {
+        let matches = self.matches();
+        let remembered = self.memory.iter().zip(&matches);
+        let in_range =
+            remembered.filter(|(object, _)| (range_m[0]..range_m[1]).contains(&object.nearest_m));
+        in_range
+            .fold([0, 0], |[seen, n], (_, entity)| [seen + usize::from(entity.is_some()), n + 1])
     }
 
     /// Numbers of remembered objects, and of all objects seen with enough pixels, within a range of
@@ -315,7 +341,7 @@ impl EpisodeRecord {
         }
         let unmatched = self.memory.iter().zip(&matches).filter(|(_, entity)| entity.is_none());
         for (remembered, _) in unmatched {
-            classes.entry(remembered.class.name()).or_default().false_memories += 1;
+            classes.entry(remembered.sighting.class.name()).or_default().false_memories += 1;
         }
     }
 
@@ -353,6 +379,7 @@ impl TrackReport {
             ),
             detection_recall_by_m: by_m(&EpisodeRecord::detection_recall),
             detection_recall: Rate::new(records.iter().map(|r| r.detection_recall(all))),
+            memory_precision_by_m: by_m(&EpisodeRecord::memory_precision),
             memory_precision: Rate::new(records.iter().map(|r| {
                 let matches = r.matches();
                 [matches.iter().flatten().count(), matches.len()]
@@ -467,11 +494,11 @@ impl BehaviorModel for MemoryRecorder {
             let is_evaluated = records.is_evaluated(object.class);
             is_evaluated && object.is_present && !records.held_tracks.contains(&object.track)
         });
-        let sighting = |object: &chaic_agents::mapping::MappedObject| Sighting {
-            class: object.class,
-            position_in_world: object.position_in_world,
-        };
-        let remembered: Vec<Sighting> = remembered.map(sighting).collect();
+        let remembered = remembered.map(|object| RememberedObject {
+            sighting: Sighting { class: object.class, position_in_world: object.position_in_world },
+            nearest_m: records.detected_m.get(&object.track).copied().unwrap_or(f32::INFINITY),
+        });
+        let remembered: Vec<RememberedObject> = remembered.collect();
         records.memory = remembered;
     }
 

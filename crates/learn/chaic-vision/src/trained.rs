@@ -9,7 +9,9 @@ use chaic_nn::{Inference, Network, Shape, weights};
 use crate::calibration::{Calibration, N_PREDICTORS, predictors};
 use crate::detector::Detector;
 use crate::features::{ImageCrop, N_FEATURES, features};
-use crate::instances::{Instance, InstanceConfig, Pixels, remove_background, sort_by_score};
+use crate::instances::{
+    Instance, InstanceConfig, Pixels, Segment, remove_background, sort_by_score,
+};
 use crate::proposals::proposals;
 use crate::roi::RoiSource;
 use crate::roi_network::RoiNetwork;
@@ -147,17 +149,19 @@ impl TrainedDetector {
         self.detector.network.stride() as u32
     }
 
-    /// Returns whether both sides of the camera's image are multiples of [`Self::image_step`].
+    /// Returns whether both sides of the camera's image are positive multiples of
+    /// [`Self::image_step`].
     pub fn fits(&self, camera: &Camera) -> bool {
         let step = self.image_step();
-        camera.width.is_multiple_of(step) && camera.height.is_multiple_of(step)
+        [camera.width, camera.height].iter().all(|side| *side > 0 && side.is_multiple_of(step))
     }
 
     /// Detects instances in an image, in descending order of score: color (u8, shape [height,
-    /// width, 3]) and depth (meters, shape [height, width]).
+    /// width, 3]) and depth (meters, shape [height, width]). Pixels whose depth is not finite
+    /// count as the far plane, and no mask but that of a fence contains them.
     ///
     /// # Panics
-    /// If the shapes do not fit the camera, or the camera does not fit the network.
+    /// As [`TrainedDetector::first_stage`].
     pub fn detect(
         &self,
         rgb: &[u8],
@@ -165,15 +169,61 @@ impl TrainedDetector {
         camera: &Camera,
         inference: &mut DetectorInference,
     ) -> Vec<Instance> {
-        let DetectorInference { first_stage, second_stage } = inference;
-        let pixels = first_stage_pixels(rgb, depth_m, camera, first_stage);
-        let mut instances = match (&self.second_stage, second_stage) {
-            (Some(stage), Some(inference)) => {
-                let source = RoiSource { features: first_stage.last_input(), pixels: &pixels };
-                stage.instances(&source, &proposals(&pixels), depth_m, inference)
+        let pixels = self.first_stage(rgb, depth_m, camera, inference);
+        match self.second_stage {
+            Some(_) => self.instances_among(&pixels, &proposals(&pixels), depth_m, inference),
+            None => {
+                let instances = pixels.instances(depth_m, &InstanceConfig::DEFAULT);
+                self.with_scores(instances, depth_m, camera)
             }
-            _ => pixels.instances(depth_m, &InstanceConfig::DEFAULT),
+        }
+    }
+
+    /// Returns the predictions of the first stage for an image, as in [`TrainedDetector::detect`].
+    ///
+    /// # Panics
+    /// If the shapes do not fit the camera, or the camera does not fit the network.
+    pub fn first_stage(
+        &self,
+        rgb: &[u8],
+        depth_m: &[f32],
+        camera: &Camera,
+        inference: &mut DetectorInference,
+    ) -> Pixels {
+        let (width, height, step) = (camera.width, camera.height, self.image_step());
+        assert!(self.fits(camera), "{width} x {height} pixels are not multiples of {step}");
+        let n_pixels = width as usize * height as usize;
+        let is_complete = rgb.len() == 3 * n_pixels && depth_m.len() == n_pixels;
+        assert!(is_complete, "color or depth do not have the camera's {width} x {height} pixels");
+        first_stage_pixels(rgb, depth_m, camera, &mut inference.first_stage)
+    }
+
+    /// Returns the instances among proposals, in descending order of score; none without a second
+    /// stage. `inference` and `pixels` are those of the last call of
+    /// [`TrainedDetector::first_stage`].
+    pub fn instances_among(
+        &self,
+        pixels: &Pixels,
+        proposals: &[Segment],
+        depth_m: &[f32],
+        inference: &mut DetectorInference,
+    ) -> Vec<Instance> {
+        let DetectorInference { first_stage, second_stage } = inference;
+        let (Some(stage), Some(buffers)) = (&self.second_stage, second_stage) else {
+            return Vec::new();
         };
+        let source = RoiSource { features: first_stage.last_input(), pixels };
+        let instances = stage.instances(&source, proposals, depth_m, buffers);
+        self.with_scores(instances, depth_m, pixels.camera())
+    }
+
+    /// Removes the background from instances, calibrates their scores and sorts them.
+    fn with_scores(
+        &self,
+        mut instances: Vec<Instance>,
+        depth_m: &[f32],
+        camera: &Camera,
+    ) -> Vec<Instance> {
         for instance in &mut instances {
             remove_background(instance, depth_m, camera);
         }
@@ -204,3 +254,6 @@ pub(crate) fn first_stage_pixels(
     inference.run(|_, row: usize, strip: &[f32]| pixels.read(row, strip, depth_m));
     pixels
 }
+
+#[cfg(test)]
+mod tests;

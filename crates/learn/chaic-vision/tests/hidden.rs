@@ -11,7 +11,7 @@ use chaic_env::helper_registry::built_in;
 use chaic_env::rules::RuleSet;
 use chaic_episodes::find_episode;
 use chaic_eval::audit::{HiddenProperty, PartnerMode, RunPair, compare};
-use chaic_vision::behavior::network::{BehaviorNetwork, TrainedBehavior};
+use chaic_vision::behavior::network::TrainedBehavior;
 use chaic_vision::behavior::recognize::LearnedBehaviorFactory;
 use chaic_vision::perception::LearnedPerceptionFactory;
 use chaic_vision::trained::TrainedDetector;
@@ -19,13 +19,11 @@ use chaic_vision::trained::TrainedDetector;
 /// Image size, a multiple of the detector's stride of 32.
 const IMAGE_SIZE: u32 = 96;
 
+/// Perception of `--track hidden`: the bundled networks.
 fn learned() -> LearnedBehaviorFactory {
-    let network = BehaviorNetwork::new();
-    let parameters = network.network.init_parameters(1);
-    let trained = Arc::new(TrainedBehavior { network, parameters, inverse_temperature: 1.0 });
     LearnedBehaviorFactory {
         perception: Arc::new(LearnedPerceptionFactory::new(TrainedDetector::built_in())),
-        model: trained,
+        model: Arc::new(TrainedBehavior::built_in()),
     }
 }
 
@@ -34,10 +32,15 @@ fn learned_perception_reveals_nothing_hidden() {
     let perception = learned();
     let helper =
         |name| built_in(name, PlannerRules::paper(), &perception).expect("the helper is built in");
-    let tasks = ["high_goal", "obstacle", "shopping", "low_target", "high_container"];
-    for (k, task) in tasks.into_iter().enumerate() {
+    let observers = [
+        ("high_goal", "rhp"),
+        ("obstacle", "random"),
+        ("shopping", "follow"),
+        ("low_target", "infer"),
+        ("high_container", "infer"),
+    ];
+    for (k, (task, name)) in observers.into_iter().enumerate() {
         let episode = find_episode(&format!("{task}/gen/502")).unwrap();
-        let name = ["rhp", "random", "follow"][k % 3];
         assert!(!helper(name).grants.ids, "{name} has the grant of ids");
         let pair = RunPair {
             episode: &episode,

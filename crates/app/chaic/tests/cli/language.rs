@@ -123,11 +123,13 @@ fn prompts_contain_failed_attempts_that_the_behavior_network_recognizes() {
     const TOLERANCE: u64 = 120;
     let dir = tempfile::tempdir().expect("the disk has space");
     let at = dir.path();
-    let prompts = Arc::new(Mutex::new(String::new()));
+    // Prompts without and with images: of `llm` and `vlm`.
+    let prompts = Arc::new(Mutex::new([String::new(), String::new()]));
     let record = Arc::clone(&prompts);
     // The helper follows the partner whenever it can.
     let say = move |question: &chaic_llm_standin::script::Question| {
-        record.lock().expect("no panic").push_str(&question.text);
+        let has_images = usize::from(question.images > 0);
+        record.lock().expect("no panic")[has_images].push_str(&question.text);
         let follow = question.plans().iter().position(|plan| plan.contains("follow the partner"));
         question.format_answer(follow.map_or(1, |k| k + 1), "It follows the partner.")
     };
@@ -136,33 +138,38 @@ fn prompts_contain_failed_attempts_that_the_behavior_network_recognizes() {
         ..Options::default()
     });
     let episode = ["--task", "high_target", "--split", "gen-standard:5000..5001"];
-    let options = ["--behavior", "learned", "--size", "128", "--helper", "llm", "--out", "run"];
+    let options = ["--behavior", "learned", "--size", "128", "--helper", "llm,vlm", "--out", "run"];
     let endpoint = ["--endpoint", &server.url(), "--model", "standin"];
     run_ok(at, &[&["eval"][..], &episode, &options, &endpoint].concat());
-    let trace = at.join("run/traces/high_target/llm/gen-standard-5000-s0.jsonl");
-    let trace = fs::read_to_string(trace).expect("a text file");
-    let events = trace.lines().map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
-    let failed = events.filter_map(|event| {
-        let is_failure = event["agent"] == 0 && event["outcome"]["failure"] == "beyond_limits";
-        let object = event["action"]["pick_up"]["object"].as_u64()?;
-        is_failure.then(|| Some((event["frame"].as_u64()?, object)))?
-    });
-    let failed: Vec<(u64, u64)> = failed.collect();
-    // Lines such as "- frame 216: pick up apple #87, failed (beyond this person's limits)".
     let prompts = prompts.lock().expect("no panic");
-    let recognized = |(frame, object): &(u64, u64)| {
-        prompts.lines().any(|line| {
-            let line = line.strip_prefix("- frame ").and_then(|rest| rest.split_once(": pick up "));
-            line.is_some_and(|(at, what)| {
-                let at: Option<u64> = at.parse().ok();
-                let is_near = at.is_some_and(|at| at.abs_diff(*frame) <= TOLERANCE);
-                is_near && what.contains(&format!(" #{object}, failed (beyond"))
+    for (helper, prompts) in [("llm", &prompts[0]), ("vlm", &prompts[1])] {
+        let trace = at.join("run/traces/high_target").join(helper);
+        let trace = fs::read_to_string(trace.join("gen-standard-5000-s0.jsonl"));
+        let trace = trace.expect("a text file");
+        let events = trace.lines().map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
+        let failed = events.filter_map(|event| {
+            let is_failure = event["agent"] == 0 && event["outcome"]["failure"] == "beyond_limits";
+            let object = event["action"]["pick_up"]["object"].as_u64()?;
+            is_failure.then(|| Some((event["frame"].as_u64()?, object)))?
+        });
+        let failed: Vec<(u64, u64)> = failed.collect();
+        // Lines such as "- frame 216: pick up apple #87, failed (beyond this person's limits)".
+        let recognized = |(frame, object): &(u64, u64)| {
+            prompts.lines().any(|line| {
+                let line =
+                    line.strip_prefix("- frame ").and_then(|rest| rest.split_once(": pick up "));
+                line.is_some_and(|(at, what)| {
+                    let at: Option<u64> = at.parse().ok();
+                    let is_near = at.is_some_and(|at| at.abs_diff(*frame) <= TOLERANCE);
+                    is_near && what.contains(&format!(" #{object}, failed (beyond"))
+                })
             })
-        })
-    };
-    assert!(!failed.is_empty() && failed.iter().any(recognized), "{failed:?}");
+        };
+        let is_recognized = !failed.is_empty() && failed.iter().any(recognized);
+        assert!(is_recognized, "{helper}: {failed:?}");
+    }
     let report = fs::read_to_string(at.join("run/report.md")).expect("a text file");
-    assert!(report.contains("LLM+BM"), "{report}");
+    assert!(report.contains("LLM+BM") && report.contains("VLM+BM"), "{report}");
 }
 
 #[test]

@@ -58,6 +58,28 @@ fn a_split_is_exported_with_metadata() {
     );
     let none = ["export", "episodes", "--split", "train", "--task", "tremor", "--out", "none"];
     assert!(run_err(at, &none).contains("no episodes"));
+
+    // Files of a folder are exported like a split.
+    let files = ["export", "episodes", "--episodes", "set/episodes"];
+    let some = [&files[..], &["--task", "shopping", "--out", "some"]].concat();
+    assert!(run_ok(at, &some).contains("2 episodes"));
+    let [split, folder] = ["set", "some"]
+        .map(|set| fs::read(at.join(set).join("episodes/shopping-8.json")).expect("an episode"));
+    assert!(split == folder);
+    let both = [&files[..], &["--split", "train", "--out", "both"]].concat();
+    assert!(run_err(at, &both).contains("cannot be used with"));
+    let none = [&files[..], &["--task", "obstacle", "--out", "none"]].concat();
+    assert!(run_err(at, &none).contains("no episode file (*.json) of these tasks"));
+    fs::create_dir(at.join("empty")).expect("the disk has space");
+    let empty = run_err(at, &["export", "episodes", "--episodes", "empty", "--out", "none"]);
+    assert!(empty.contains("empty holds no episode file (*.json)\n"), "{empty}");
+    // An edited episode is not generated.
+    super::shorten(&at.join("set/episodes"));
+    let edited = run_err(at, &[&files[..], &["--out", "edited"]].concat());
+    assert!(
+        edited.contains("no generator of this version") && !at.join("edited").exists(),
+        "{edited}"
+    );
 }
 
 #[test]

@@ -13,7 +13,8 @@ use {
     std::time::{Duration, Instant},
 };
 
-const TRAININGS: [&str; 6] = ["detector", "behavior", "ppo", "clone", "visual", "opponent"];
+const TRAININGS: [&str; 7] =
+    ["detector", "behavior", "ppo", "clone", "visual", "partner", "opponent"];
 /// Longest time until a training ends after a signal. On an idle machine it is 5 s.
 #[cfg(unix)]
 const SOON: Duration = Duration::from_secs(20);

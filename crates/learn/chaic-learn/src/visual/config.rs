@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::actions::ActionSpace;
 use crate::ppo::PpoConfig;
 use crate::reward_config;
-use crate::rollout_config::{GENERATORS, draw_episode};
+use crate::rollout_config::{GENERATORS, TrainingAppearance, draw_episode};
 
 /// Configuration of `chaic train visual`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -45,6 +45,8 @@ pub struct VisualConfig {
     pub perception: String,
     /// Behavior recognition of the helper, as `chaic eval --behavior`.
     pub behavior: String,
+    /// Light and colors of training episodes. Validation has the canonical ones.
+    pub appearance: TrainingAppearance,
     /// Validation episodes per task.
     pub validation_episodes: usize,
     /// Weights of the reward terms.
@@ -71,6 +73,7 @@ impl Default for VisualConfig {
             image_size: 256,
             perception: GROUND_TRUTH.to_owned(),
             behavior: GROUND_TRUTH.to_owned(),
+            appearance: TrainingAppearance::Canonical,
             validation_episodes: 4,
             rewards: RewardWeights::STANDARD,
             ppo: PpoConfig { batch_size: 2, shards: 1, ..defaults },
@@ -89,5 +92,30 @@ impl VisualConfig {
         let task = self.tasks[index as usize % self.tasks.len()];
         let split = &self.splits[index as usize / self.tasks.len() % self.splits.len()];
         draw_episode(task, split, RngStream::new(self.seed, "episodes", index))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tasks_and_generators_take_turns_over_the_environments() {
+        let config = VisualConfig {
+            n_envs: 2,
+            tasks: vec![TaskId::LowTarget, TaskId::MovingHouse],
+            splits: GENERATORS.map(str::to_owned).to_vec(),
+            ..VisualConfig::default()
+        };
+        for (slot, k, expected) in [
+            (0, 0, "low_target/gen/"),
+            (1, 0, "moving_house/gen/"),
+            (0, 1, "low_target/gen-standard/"),
+            (1, 1, "moving_house/gen-standard/"),
+            (0, 2, "low_target/gen/"),
+        ] {
+            let id = config.episode(slot, k);
+            assert!(id.starts_with(expected), "{id} in slot {slot}, number {k}");
+        }
     }
 }

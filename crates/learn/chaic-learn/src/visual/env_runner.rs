@@ -61,7 +61,8 @@ impl EnvRunner {
         pass: Pass,
     ) -> Result<EnvRunner, RolloutError> {
         let TrainingSetup { config, perception, opponent, .. } = setup;
-        let episode = find_episode(&config.episode(slot, n_started))?;
+        let id = config.episode(slot, n_started);
+        let episode = find_episode(&id)?;
         let (mut encoder, grants) =
             ObservationEncoder::new(RuleSet::PAPER.planner, &**perception, opponent.clone());
         let sensors = SensorConfig { image_size: config.image_size, ..encoder.sensors() };
@@ -69,6 +70,7 @@ impl EnvRunner {
             EpisodeAgents { helper: Some(AgentSlot::external(grants, sensors)), partner: None };
         let config = EpisodeConfig {
             image_size: Some(config.image_size),
+            appearance: config.appearance.of_episode(&id),
             ..EpisodeConfig::new(&episode, "learner")
         };
         let mut env = Env::new(config, agents)?;
@@ -233,4 +235,48 @@ pub(super) fn replay(
     let runners: Result<Vec<Option<EnvRunner>>, String> =
         progress.par_iter().enumerate().map(replay_one).collect();
     Ok(runners?.into_iter().collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::opponent::network::OpponentInput;
+    use crate::rollout_config::TrainingAppearance;
+    use crate::visual::observation::IMAGE_CHANNELS;
+    use chaic_agents::perception_factory::GroundTruthPerceptionFactory;
+
+    /// Starts the first episode of a training with this appearance.
+    fn start(appearance: TrainingAppearance) -> EnvRunner {
+        let config = VisualConfig {
+            action_space: ActionSpace::Primitives,
+            image_size: 128,
+            appearance,
+            ..VisualConfig::default()
+        };
+        let model = VisualNetwork::new(config.action_space, OpponentInput::None);
+        let perception: Arc<dyn PerceptionFactory> = Arc::new(GroundTruthPerceptionFactory);
+        let pass = model.pass();
+        let setup = TrainingSetup { config, perception, opponent: None, model };
+        EnvRunner::new(&setup, 0, 0, pass).unwrap()
+    }
+
+    #[test]
+    fn a_varied_appearance_changes_colors_but_no_state() {
+        let mut runners = [TrainingAppearance::Canonical, TrainingAppearance::Varied].map(start);
+        // Steps and turns.
+        for action_index in [1, 0, 2, 0, 0] {
+            let [canonical, varied] = &runners;
+            assert_eq!(canonical.env.digest(), varied.env.digest());
+            let (a, b) = (&canonical.observation, &varied.observation);
+            assert!(a.map == b.map && a.state == b.state);
+            let pixels = || a.image.chunks(IMAGE_CHANNELS).zip(b.image.chunks(IMAGE_CHANNELS));
+            let n_other = pixels().filter(|(a, b)| a[..3] != b[..3]).count();
+            assert!(2 * n_other > pixels().count(), "{n_other} pixels have another color");
+            assert!(pixels().all(|(a, b)| a[3] == b[3]), "depth is the same");
+            for runner in &mut runners {
+                let rewards = &RewardWeights::STANDARD;
+                runner.act(action_index, ActionSpace::Primitives, rewards).unwrap();
+            }
+        }
+    }
 }

@@ -46,13 +46,14 @@ impl VisualWeights {
     /// Parses a weights file.
     ///
     /// # Errors
-    /// [`WeightsError`] if the file is incomplete or belongs to another network.
+    /// [`WeightsError`] if the file is incomplete, belongs to another network, or was trained with other
+    /// classes.
     pub fn from_bytes(bytes: &[u8]) -> Result<VisualWeights, WeightsError> {
         let kind = weights::kind(bytes)?;
         let model = VisualNetwork::from_kind(&kind);
         let model =
             model.unwrap_or_else(|| VisualNetwork::new(ActionSpace::Plans, OpponentInput::None));
-        let parameters = weights::from_bytes(model.network(), bytes, &model.kind())?;
+        let parameters = model.read(bytes)?;
         let digest = Some(weights::digest(bytes));
         Ok(VisualWeights { digest, ..VisualWeights::new(&model, parameters) })
     }

@@ -4,9 +4,10 @@
 use std::ops::Range;
 
 use chaic_nn::simd::widest;
+use chaic_nn::weights::{self, WeightsError};
 use chaic_nn::{Kernel, Network, Node, Pass, Shape, Tensor};
 
-use super::actions::ActionSpace;
+use super::actions::{ActionSpace, classes};
 use super::observation::{
     IMAGE_CHANNELS, IMAGE_SIZE, MAP, MAP_CHANNELS, N_OPPONENT, N_STATE, VisualObservation,
 };
@@ -24,13 +25,22 @@ pub struct VisualNetwork {
     opponent: OpponentInput,
 }
 
-/// Returns the kind in weights files.
+/// Returns the kind in weights files, without the classes.
 fn kind(action_space: ActionSpace, opponent: OpponentInput) -> String {
     let name = match action_space {
         ActionSpace::Plans => "chaic visual plan policy 1",
         ActionSpace::Primitives => "chaic primitive policy 2",
     };
     format!("{name}{}", opponent.kind_suffix())
+}
+
+/// Separates the kind in weights files from the digest of the classes that actions refer to.
+const CLASSES: &str = ", classes ";
+
+/// Returns a digest of the names of [`classes`] in their order.
+fn class_digest() -> String {
+    let names: Vec<&str> = classes().iter().map(|class| class.info().name).collect();
+    weights::digest(names.join("\n").as_bytes())
 }
 
 /// Size of the image patches that become one pixel of the first map, as in vision transformers
@@ -87,9 +97,30 @@ impl VisualNetwork {
         VisualNetwork { network: net, logits, value, action_space, opponent }
     }
 
-    /// Kind in weights files.
+    /// Kind in weights files. It has a digest of the classes, if actions refer to classes.
     pub fn kind(&self) -> String {
-        kind(self.action_space, self.opponent)
+        let kind = kind(self.action_space, self.opponent);
+        match self.action_space {
+            ActionSpace::Plans => format!("{kind}{CLASSES}{}", class_digest()),
+            ActionSpace::Primitives => kind,
+        }
+    }
+
+    /// Parses the parameters in a weights file. Files of earlier versions without the digest of the
+    /// classes are accepted.
+    ///
+    /// # Errors
+    /// [`WeightsError`] if the file is incomplete, belongs to another network, or was trained with other
+    /// classes.
+    pub fn read(&self, bytes: &[u8]) -> Result<Vec<f32>, WeightsError> {
+        let (found, current) = (weights::kind(bytes)?, self.kind());
+        let earlier = without_class_digest(&current);
+        if found != current && found != earlier && without_class_digest(&found) == earlier {
+            let problem = "trained with other object classes or in another order; train it again";
+            return Err(WeightsError::Configuration(problem.to_owned()));
+        }
+        let expected = if found == earlier { earlier } else { current.as_str() };
+        weights::from_bytes(&self.network, bytes, expected)
     }
 
     /// Meaning of the outputs.
@@ -97,8 +128,9 @@ impl VisualNetwork {
         self.action_space
     }
 
-    /// Returns the network of this kind in weights files, if there is one.
+    /// Returns the network of this kind in weights files, if there is one. The classes may be other ones.
     pub fn from_kind(name: &str) -> Option<VisualNetwork> {
+        let name = without_class_digest(name);
         let kinds =
             ActionSpace::ALL.into_iter().flat_map(|space| OpponentInput::ALL.map(|o| (space, o)));
         let found = kinds.into_iter().find(|(space, opponent)| kind(*space, *opponent) == name);
@@ -116,6 +148,11 @@ impl VisualNetwork {
         let parameters = parameters[self.opponent_range()?].to_vec();
         Some(OpponentModel::new(parameters, self.opponent == OpponentInput::Granted))
     }
+}
+
+/// Returns a kind in weights files without the digest of the classes.
+fn without_class_digest(kind: &str) -> &str {
+    kind.split_once(CLASSES).map_or(kind, |(before, _)| before)
 }
 
 /// Returns the log-probabilities of all combinations of independent choices, the last choice varying

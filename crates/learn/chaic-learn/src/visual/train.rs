@@ -1,8 +1,8 @@
 //! Training of visual policies by PPO, with the paper's hyperparameters by default.
 
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
 
 use chaic_env::rules::RuleSet;
 use chaic_nn::Network;
@@ -22,7 +22,7 @@ use crate::opponent::network::OpponentInput;
 use crate::ppo::{Schedule, ppo_bounds, update};
 use crate::rollout::{RolloutEpisode, RolloutError};
 use crate::rollout_config::{
-    MAX_VALIDATION_EPISODES, REWARD, check_splits, read_opponent, validation_episodes,
+    MAX_VALIDATION_EPISODES, REWARD, Validation, check_splits, read_opponent, validation_episodes,
 };
 use crate::train::read_reference;
 
@@ -39,6 +39,8 @@ pub struct VisualTrainer {
     /// Progress of the environments before an update that was stopped; it is restored before the
     /// next update.
     interrupted_at: Option<Vec<EpisodeProgress>>,
+    /// Transport rates of the baseline helper on the validation episodes, once they are known.
+    baseline: OnceLock<Vec<f64>>,
 }
 
 impl VisualTrainer {
@@ -100,7 +102,7 @@ impl Trainer for VisualTrainer {
         if let (Some(range), Some(opponent)) = (model.opponent_range(), &opponent) {
             learner.parameters[range].copy_from_slice(opponent.parameters());
         }
-        let reference = read_reference(&config.ppo, folder, model.network(), &model.kind());
+        let reference = read_reference(&config.ppo, folder, |bytes| model.read(bytes));
         let reference = reference.map_err(TrainingError::InvalidConfig)?;
         let progress = vec![EpisodeProgress::default(); config.n_envs];
         let setup = TrainingSetup { config: config.clone(), perception, opponent, model };
@@ -114,6 +116,7 @@ impl Trainer for VisualTrainer {
             reference,
             runners,
             interrupted_at: None,
+            baseline: OnceLock::new(),
         }))
     }
 
@@ -145,7 +148,7 @@ impl Trainer for VisualTrainer {
         let opponent = read_opponent(config.opponent.as_deref()).ok().flatten();
         let model =
             VisualNetwork::new(config.action_space, OpponentInput::from_model(opponent.as_ref()));
-        let mut parameters = weights::from_bytes(model.network(), weights, &model.kind())?;
+        let mut parameters = model.read(weights)?;
         // The rollouts use the model of the configuration, whatever the weights contain.
         if let (Some(range), Some(opponent)) = (model.opponent_range(), &opponent) {
             parameters[range].copy_from_slice(opponent.parameters());
@@ -230,7 +233,7 @@ impl Trainer for VisualTrainer {
     }
 
     fn validate(&self, stop: &AtomicBool) -> Result<Option<(Metrics, Vec<u8>)>, WeightsError> {
-        let VisualTrainer { setup, learner, .. } = self;
+        let VisualTrainer { setup, learner, baseline, .. } = self;
         let TrainingSetup { config, perception, model, .. } = setup;
         let parameters = learner.parameters.clone();
         let bytes = weights::to_bytes(model.network(), &parameters, &model.kind())?;
@@ -247,7 +250,11 @@ impl Trainer for VisualTrainer {
         let rates: Result<Vec<Option<f64>>, RolloutError> = episodes.par_iter().map(rate).collect();
         let rates = rates.expect("generated episodes can be played");
         let Some(rates) = rates.into_iter().collect::<Option<Vec<f64>>>() else { return Ok(None) };
-        Ok(Some((metrics([("tr", rates.iter().sum::<f64>() / rates.len() as f64)]), bytes)))
+        let validation = Validation { perception: &**perception, baseline };
+        let compared = validation.compare(&rates, &episodes, config.image_size, stop);
+        let Some(mut named) = compared else { return Ok(None) };
+        named.insert("tr".to_owned(), rates.iter().sum::<f64>() / rates.len() as f64);
+        Ok(Some((named, bytes)))
     }
 }
 

@@ -1,5 +1,6 @@
 //! Integration tests of `chaic-learn`.
 
+mod learning;
 mod old_keys;
 mod opponent;
 mod partner;

@@ -19,6 +19,7 @@ use chaic_learn::bundled::BundledHelper;
 use chaic_learn::helpers::{NamedPolicy, PolicyRegistry};
 use chaic_learn::opponent::network::OpponentInput;
 use chaic_learn::opponent::train::OpponentTrainer;
+use chaic_learn::partner::train::PartnerCloningTrainer;
 use chaic_learn::train::{CloningConfig, PolicyTrainer, PpoTrainingConfig};
 use chaic_learn::visual::actions::ActionSpace;
 use chaic_learn::visual::network::VisualNetwork;
@@ -91,6 +92,10 @@ fn the_recipes_of_bundled_weights_are_valid() {
     ] {
         assert!(parse_config::<OpponentTrainer>(recipe).is_ok());
     }
+    let recipe = include_str!("../../weights/rl_paper.toml");
+    assert!(parse_config::<VisualTrainer>(recipe).is_ok());
+    let recipe = include_str!("../../weights/partner.toml");
+    assert!(parse_config::<PartnerCloningTrainer>(recipe).is_ok());
     // These need the weights of an opponent model.
     let without_opponent = |recipe: &str| {
         let line = "opponent = \"opponent/opponent.safetensors\"\n";
@@ -103,25 +108,38 @@ fn the_recipes_of_bundled_weights_are_valid() {
     assert!(parse_config::<PolicyTrainer<CloningConfig>>(&recipe).is_ok());
 }
 
-#[test]
-fn bundled_helpers_learn_no_secret() {
+/// Asserts that a helper cannot distinguish two episodes of each task that differ in a secret of the partner.
+/// The secrets take turns.
+fn check_secrets(name: &str, tasks: impl Iterator<Item = TaskId>) {
     let registry = bundled();
-    for (k, task) in TaskId::paper().enumerate() {
+    for (k, task) in tasks.enumerate() {
         let episode = find_episode(&format!("{task}/gen/501")).unwrap();
         let secret = HiddenProperty::ALL[k % HiddenProperty::ALL.len()];
-        // The task of the other bundled helpers is granted.
-        let helper = || registry.make("cloned", PlannerRules::paper()).unwrap();
+        let helper = || registry.make(name, PlannerRules::paper()).unwrap();
         for partner in [PartnerMode::Acts, PartnerMode::Waits] {
             let rules = RuleSet::PAPER;
             let episode = &episode;
             let pair = RunPair { episode, secret, partner, rules, frames: 900, image_size: 48 };
             let result = compare(&pair, &helper, None).unwrap();
             if let Some(violation) = result.violation {
-                panic!("{task}, {secret:?}, partner {partner:?}: {violation}");
+                panic!("{name} in {task}, {secret:?}, partner {partner:?}: {violation}");
             }
             let is_long = partner == PartnerMode::Acts || result.compared > 20;
-            assert!(is_long, "{task}: {} observations", result.compared);
+            assert!(is_long, "{name} in {task}: {} observations", result.compared);
         }
+    }
+}
+
+#[test]
+fn bundled_helpers_learn_no_secret() {
+    check_secrets("cloned", TaskId::paper());
+}
+
+#[test]
+fn bundled_helpers_with_a_hint_or_images_learn_no_secret() {
+    // The grant `task` of `rl_paper` discloses the kind of person, which both runs share.
+    for name in ["rl", "rl_paper"] {
+        check_secrets(name, [TaskId::LowTarget, TaskId::Obstacle].into_iter());
     }
 }
 
@@ -169,6 +187,27 @@ fn a_folder_of_weights_is_a_policy_per_task() {
     let empty = tempfile::tempdir().unwrap();
     let problem = NamedPolicy::read("mine", empty.path()).err().unwrap().to_string();
     assert!(problem.contains("no weights file of a task"), "{problem}");
+}
+
+#[test]
+fn visual_weights_for_other_classes_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("policy.safetensors");
+    let model = VisualNetwork::new(ActionSpace::Plans, OpponentInput::None);
+    let parameters = model.network().init_parameters(1);
+    let read = |kind: &str| {
+        let bytes = weights::to_bytes(model.network(), &parameters, kind).unwrap();
+        fs::write(&file, bytes).unwrap();
+        NamedPolicy::read("mine", &file).map(drop)
+    };
+    let kind = model.kind();
+    let (before, digest) = kind.split_once(", classes ").unwrap();
+    assert_eq!(digest.len(), 12);
+    assert!(read(&kind).is_ok());
+    assert!(read(before).is_ok(), "weights of earlier versions name no classes");
+    let problem = read(&format!("{before}, classes 0123456789ab")).unwrap_err().to_string();
+    assert!(problem.contains("policy.safetensors: trained with other object classes"), "{problem}");
+    assert!(!problem.contains('\n'), "{problem}");
 }
 
 #[test]

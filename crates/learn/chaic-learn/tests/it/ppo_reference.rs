@@ -1,9 +1,12 @@
 //! PPO updates equal those of Stable-Baselines3 on recorded rollouts
-//! (`benches/stable_baselines3/record.py`).
+//! (`benches/stable_baselines3/record.py`). The recordings have decisions of one time unit and one minibatch per
+//! epoch; durations and minibatches are compared with the formulas.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 
+use chaic_core::geom::math;
+use chaic_core::rng::RngStream;
 use chaic_learn::actor_critic::{ActorCritic, ActorCriticOutput, OutputGrad, log_softmax};
 use chaic_learn::ppo::{PpoConfig, Schedule, Trajectory, Transition, compute_gae, update};
 use chaic_nn::{Network, Node, Pass, Shape, Tensor};
@@ -175,4 +178,110 @@ fn updates_equal_those_of_stable_baselines3() {
         clips_ratios |= metrics.clip_fraction > 0.0;
     }
     assert!(clips_values && clips_ratios && recording.cases.len() == 3);
+}
+
+/// Returns the advantages of a semi-Markov process by their definition: TD errors, discounted by `gamma` for each
+/// frame and by `gae_lambda` for each decision between.
+fn reference_advantages(config: &PpoConfig, trajectory: &Trajectory<Vec<f32>>) -> Vec<f64> {
+    let steps = &trajectory.transitions;
+    let discount = |frames: f32| {
+        (0..frames as usize).fold(1.0, |product, _| product * f64::from(config.gamma))
+    };
+    let td_error = |k: usize| {
+        let next_value = steps.get(k + 1).map_or(trajectory.bootstrap_value, |step| step.value);
+        f64::from(steps[k].reward) + discount(steps[k].duration) * f64::from(next_value)
+            - f64::from(steps[k].value)
+    };
+    let advantage = |first: usize| {
+        let later = (first..steps.len()).map(|k| {
+            let frames: f32 = steps[first..k].iter().map(|step| step.duration).sum();
+            let lambdas = (first..k).fold(1.0, |product, _| product * f64::from(config.gae_lambda));
+            discount(frames) * lambdas * td_error(k)
+        });
+        later.sum::<f64>()
+    };
+    (0..steps.len()).map(advantage).collect()
+}
+
+#[test]
+fn advantages_of_decisions_of_any_duration_follow_from_their_td_errors() {
+    let mut rng = RngStream::new(1, "advantages", 0);
+    for (gamma, gae_lambda) in [(0.9995, 0.98), (0.99, 0.95), (0.99, 0.0), (0.999, 1.0)] {
+        let config = PpoConfig { gamma, gae_lambda, ..PpoConfig::default() };
+        let mut step = || Transition {
+            observation: Vec::new(),
+            action: 0,
+            log_prob: 0.0,
+            value: rng.range(-1.0, 1.0),
+            reward: rng.range(-1.0, 1.0),
+            duration: (1 + rng.below(200)) as f32,
+        };
+        let transitions: Vec<Transition<Vec<f32>>> = (0..40).map(|_| step()).collect();
+        let trajectory = Trajectory { transitions, bootstrap_value: 0.7 };
+        let expected = reference_advantages(&config, &trajectory);
+        for (found, expected) in compute_gae(&config, &trajectory).into_iter().zip(expected) {
+            let error = (f64::from(found) - expected).abs();
+            assert!(error < 1e-4, "gamma {gamma}, lambda {gae_lambda}: {found} is not {expected}");
+        }
+    }
+}
+
+/// Normalizes the rewards of a minibatch to mean 0 and variance 1.
+fn normalize_rewards(batch: &mut [Trajectory<Vec<f32>>]) {
+    let rewards: Vec<f64> = batch.iter().map(|t| f64::from(t.transitions[0].reward)).collect();
+    let n = rewards.len() as f64;
+    let mean = rewards.iter().sum::<f64>() / n;
+    let variance = rewards.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / (n - 1.0);
+    for (trajectory, reward) in batch.iter_mut().zip(rewards) {
+        trajectory.transitions[0].reward = ((reward - mean) / variance.sqrt()) as f32;
+    }
+}
+
+#[test]
+fn advantages_are_normalized_within_each_minibatch() {
+    const SEED: u64 = 3;
+    // Without a value loss, rewards are advantages and have no other effect.
+    let config = PpoConfig {
+        n_epochs: 1,
+        batch_size: 4,
+        learning_rate: 0.01,
+        vf_coef: 0.0,
+        shards: 1,
+        ..PpoConfig::default()
+    };
+    let mut rng = RngStream::new(1, "minibatches", 0);
+    let decision = |_: usize| {
+        let transition: Transition<Vec<f32>> = Transition {
+            observation: (0..N_FEATURES).map(|_| rng.range(-1.0, 1.0)).collect(),
+            action: rng.below(N_ACTIONS),
+            log_prob: math::ln(1.0 / N_ACTIONS as f32),
+            value: 0.0,
+            reward: rng.range(0.5, 9.0),
+            duration: 1.0,
+        };
+        Trajectory { transitions: vec![transition], bootstrap_value: 0.0 }
+    };
+    let decisions: Vec<Trajectory<Vec<f32>>> = (0..12).map(decision).collect();
+    let model = Linear::new();
+    let learn = |learner: &mut Learner, config: &PpoConfig, decisions: &[Trajectory<Vec<f32>>]| {
+        let schedule = Schedule { seed: SEED, iteration: 0, progress_remaining: 1.0 };
+        update(config, &model, learner, decisions, None, schedule, &AtomicBool::new(false))
+            .unwrap();
+    };
+    let mut whole = Learner::new(&model.network, 1, 1);
+    learn(&mut whole, &config, &decisions);
+    // The same minibatches one by one, with rewards that are normalized here.
+    let mut order: Vec<usize> = (0..decisions.len()).collect();
+    RngStream::new(SEED, "batches", 0).shuffle(&mut order);
+    let mut by_batch = Learner::new(&model.network, 1, 1);
+    for batch in order.chunks(config.batch_size) {
+        let mut batch: Vec<Trajectory<Vec<f32>>> =
+            batch.iter().map(|k| decisions[*k].clone()).collect();
+        normalize_rewards(&mut batch);
+        learn(&mut by_batch, &config, &batch);
+    }
+    for (found, expected) in whole.parameters.iter().zip(&by_batch.parameters) {
+        assert_close("parameter", f64::from(*found), f64::from(*expected));
+    }
+    assert_ne!(whole.parameters, Learner::new(&model.network, 1, 1).parameters);
 }

@@ -27,7 +27,7 @@ use chaic_nn::weights;
 use chaic_training::conformance::{bounds_every_number, refuses_damaged_checkpoints};
 use chaic_training::run::checkpoint_bytes;
 use chaic_training::{
-    CHECKPOINT, Trainer, TrainingError, TrainingRun, parse_config, read_config_with,
+    CHECKPOINT, CURVES, Trainer, TrainingError, TrainingRun, parse_config, read_config_with,
 };
 
 static NEVER_STOP: AtomicBool = AtomicBool::new(false);
@@ -132,10 +132,11 @@ fn experts_generators_and_penalties_are_checked_before_a_training() {
     assert!(problem.contains("kl_coef") && problem.contains("--weights"), "{problem}");
     assert!(!out.exists());
     for (text, words) in [
-        ("[expert]\nhelper = \"follow\"", ["expert.helper", "infer, rhp, oracle"]),
+        ("[expert]\nhelper = \"random\"", ["expert.helper", "follow, rhp, oracle"]),
         ("[rollout]\nsplits = [\"test\"]", ["rollout.splits", "gen, gen-standard"]),
         ("[rollout]\nsplits = []", ["rollout.splits", "empty"]),
         ("[rollout]\npartners = [\"fast\"]", ["rollout.partners", "rules, farthest"]),
+        ("[rollout]\nappearance = \"dark\"", ["`dark`", "`canonical` or `varied`"]),
     ] {
         let problem = parse_config::<PolicyTrainer<CloningConfig>>(text).unwrap_err();
         assert!(words.iter().all(|word| problem.contains(word)), "{problem}");
@@ -379,6 +380,8 @@ fn check_interrupted_visual_training(action_space: ActionSpace) {
         fs::read(out.join(CHECKPOINT)).unwrap()
     });
     assert!(checkpoints[0] == checkpoints[1]);
+    let curves = fs::read_to_string(folder.path().join("true").join(CURVES)).unwrap();
+    assert!(curves.contains("\"tr_baseline\""), "{curves}");
     let weights = folder.path().join("true").join(VisualTrainer::WEIGHTS);
     let policy = NamedPolicy::read("mine", &weights).unwrap();
     let helpers = PolicyRegistry::bundled(&BuiltInHelpers, Arc::new(GroundTruthPerceptionFactory))

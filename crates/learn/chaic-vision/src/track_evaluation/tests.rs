@@ -17,6 +17,10 @@ fn perfect_detections_are_remembered_and_errors_lower_the_scores() {
     assert!(perfect.detection_precision.value > 0.99, "{perfect:?}");
     assert!(perfect.detection_recall.value > 0.95, "{perfect:?}");
     assert!(perfect.memory_recall.value > 0.9, "{perfect:?}");
+    // Nearly all objects are first detected within 10 m.
+    let n = perfect.memory_precision.n;
+    let in_range: usize = perfect.memory_precision_by_m.values().map(|rate| rate.n).sum();
+    assert!(in_range <= n && 10 * in_range >= 9 * n && n > 0, "{perfect:?}");
     let noisy = report_of(DetectorNoiseModel {
         misclassification_rate: 0.3,
         false_positives_per_image: 0.2,
@@ -43,6 +47,10 @@ fn the_nearest_pairs_of_one_class_match() {
         class: ClassId::named(class),
         position_in_world: Vec3::new(x, 0.0, 0.0),
     };
+    let remembered = |class: &str, x: f32, nearest_m: f32| RememberedObject {
+        sighting: sighting(class, x),
+        nearest_m,
+    };
     let truth = |class: &str, x: f32, nearest_m: f32| TrueObject {
         last: sighting(class, x),
         nearest_m,
@@ -56,12 +64,19 @@ fn the_nearest_pairs_of_one_class_match() {
             (EntityId(12), truth("banana", 5.0, 3.5)),
             (EntityId(13), truth("banana", 9.0, f32::INFINITY)),
         ]),
-        memory: vec![sighting("apple", 0.3), sighting("apple", 0.35), sighting("bread", 5.0)],
+        memory: vec![
+            remembered("apple", 0.3, 1.5),
+            remembered("apple", 0.35, 3.0),
+            remembered("bread", 5.0, 3.5),
+        ],
         ..EpisodeRecord::default()
     };
     assert_eq!(record.matches(), [Some(EntityId(10)), Some(EntityId(11)), None]);
     assert_eq!(record.memory_recall([0.0, 10.0]), [2, 3]);
     assert_eq!(record.memory_recall([2.0, 4.0]), [1, 2]);
+    assert_eq!(record.memory_precision([0.0, 2.0]), [1, 1]);
+    assert_eq!(record.memory_precision([2.0, 4.0]), [1, 2]);
+    assert_eq!(record.memory_precision([4.0, 10.0]), [0, 0]);
     let rate = Rate::new([[1, 2], [3, 4]].into_iter());
     assert!((rate.value - 4.0 / 6.0).abs() < 1e-9 && rate.interval > 0.0 && rate.n == 6);
 }

@@ -9,7 +9,7 @@ area's packages. Areas, all by default:
     world      rules of the world
     metrics    metrics and their uncertainty
     verify     re-simulation of recorded runs
-    grants     what each agent observes
+    grants     what each agent observes, and which grants it has
 
 --shard K/N takes every N-th mutant, from the K-th on. The script works on a copy of the checkout
 under DIR (target/mutants by default), and prints a table, all mutants that no test caught, and the
@@ -68,8 +68,13 @@ AREAS = {
         WITHOUT_INTERRUPTIONS,
     ),
     "grants": Area(
-        ("crates/agents/chaic-env/src/observer.rs", "crates/agents/chaic-env/src/track.rs"),
-        ("chaic-env", "chaic-eval"),
+        (
+            "crates/core/chaic-core/src/observation.rs",
+            "crates/agents/chaic-env/src/agent_slot.rs",
+            "crates/agents/chaic-env/src/observer.rs",
+            "crates/agents/chaic-env/src/track.rs",
+        ),
+        ("chaic-core", "chaic-env", "chaic-eval"),
         (),
         (*WITHOUT_INTERRUPTIONS, *WITHOUT_SCORES),
     ),

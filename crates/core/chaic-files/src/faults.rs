@@ -71,7 +71,7 @@ pub enum FaultKind {
     /// The process ends after this operation.
     CrashAfter,
     /// Power fails after this operation: the process ends, and files lose all bytes that were not
-    /// flushed. A renamed file that was not flushed is torn.
+    /// flushed. A renamed file that was not flushed is torn, also in a renamed folder.
     PowerFailure,
 }
 
@@ -165,6 +165,20 @@ struct State {
     flushed_len: BTreeMap<PathBuf, u64>,
 }
 
+impl State {
+    /// Moves the flushed lengths of a renamed file, or of the files in a renamed folder.
+    fn rename(&mut self, from: &Path, to: &Path) {
+        let new_path = |path: &Path| match path.strip_prefix(from) {
+            Ok(below) if below.as_os_str().is_empty() => to.to_owned(),
+            Ok(below) => to.join(below),
+            Err(_) => path.to_owned(),
+        };
+        let kept = std::mem::take(&mut self.flushed_len).into_iter();
+        let kept = kept.filter(|(path, _)| !path.starts_with(to));
+        self.flushed_len = kept.map(|(path, len)| (new_path(&path), len)).collect();
+    }
+}
+
 static INJECTOR: OnceLock<Injector> = OnceLock::new();
 
 /// Records the operations of this process from now on, and lets one of them fail. Returns false if
@@ -206,12 +220,9 @@ pub(crate) fn perform_rename(
 ) -> io::Result<()> {
     match INJECTOR.get() {
         None => action(),
-        Some(injector) => injector.perform(Operation::Rename, from, action, |state| {
-            match state.flushed_len.remove(from) {
-                Some(len) => state.flushed_len.insert(to.to_owned(), len),
-                None => state.flushed_len.remove(to),
-            };
-        }),
+        Some(injector) => {
+            injector.perform(Operation::Rename, from, action, |state| state.rename(from, to))
+        }
     }
 }
 

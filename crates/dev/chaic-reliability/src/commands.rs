@@ -46,7 +46,8 @@ impl Ended {
 pub fn chaic(folder: &Path, fault: Option<&FaultPlan>, log: Option<&Path>) -> Result<Command> {
     let program = std::env::current_exe().context("can't find this program")?;
     let mut command = Command::new(program);
-    command.current_dir(folder).stdin(Stdio::null()).arg("chaic");
+    // A crash leaves temporary files, which end with the folder.
+    command.current_dir(folder).env("TMPDIR", folder).stdin(Stdio::null()).arg("chaic");
     if let Some(FaultPlan { path, index, kind }) = fault {
         command.args(["--fault", kind.name(), "--at", &index.to_string()]).arg("--path").arg(path);
     }
@@ -94,6 +95,9 @@ pub struct FileOperation {
 
 /// Runs `chaic` in a folder, and returns its file operations, sorted: threads may change their order.
 ///
+/// Scenarios name their files relative to the folder. Files with absolute paths are temporary and have random
+/// names, so their operations are left out.
+///
 /// # Errors
 /// If it fails.
 pub fn operations(folder: &Path, arguments: &[&str], log: &Path) -> Result<Vec<FileOperation>> {
@@ -105,7 +109,8 @@ pub fn operations(folder: &Path, arguments: &[&str], log: &Path) -> Result<Vec<F
     let text = std::fs::read_to_string(log).context("can't read the list of operations")?;
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     let mut found = Vec::new();
-    for (kind, path) in text.lines().filter_map(|line| line.split_once('\t')) {
+    let records = text.lines().filter_map(|line| line.split_once('\t'));
+    for (kind, path) in records.filter(|(_, path)| Path::new(path).is_relative()) {
         let count = counts.entry(path).or_default();
         found.push(FileOperation { path: path.to_owned(), index: *count, kind: kind.to_owned() });
         *count += 1;

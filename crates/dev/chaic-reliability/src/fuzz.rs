@@ -3,8 +3,10 @@
 //! An input with a new message joins the inputs that are changed further, so that changes add up.
 //! Promises: no panic, no hang, bounded memory, and a message of one line.
 
+mod import;
 mod inputs;
 mod mutate;
+mod processes;
 mod targets;
 
 use std::collections::BTreeSet;
@@ -38,6 +40,9 @@ const MAX_KEPT_BYTES: usize = 2 << 10;
 /// Most inputs that the corpus keeps per parser.
 const MAX_KEPT: usize = 24;
 
+/// Head of the table.
+const HEAD: &str = "| parser | inputs | messages | failures | memory, MiB |\n|---|--:|--:|--:|--:|";
+
 /// Options of `fuzz`.
 #[derive(Args)]
 pub struct FuzzOptions {
@@ -59,6 +64,9 @@ pub struct FuzzOptions {
     /// Add short inputs with a new message to the corpus.
     #[arg(long)]
     keep: bool,
+    /// Number of parsers at the same time, each in a process of its own, 1 to 256.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=256))]
+    jobs: u32,
 }
 
 /// Result for one parser.
@@ -83,13 +91,17 @@ struct Current {
 /// If a parser is unknown or the inputs cannot be prepared.
 pub fn run_all(options: &FuzzOptions) -> Result<bool> {
     let targets = select(&options.targets)?;
+    if options.jobs > 1 {
+        println!("{HEAD}");
+        return processes::run(&targets, options);
+    }
     let dir = tempfile::tempdir().context("no temporary folder")?;
     let inputs = Inputs::new(dir.path())?;
     let current = Arc::new(Mutex::new(Current::default()));
     watch(Arc::clone(&current), options.corpus.clone());
     report_other_panics(Arc::clone(&current));
     let mut n_failures = 0;
-    println!("| parser | inputs | messages | failures | memory, MiB |\n|---|--:|--:|--:|--:|");
+    println!("{HEAD}");
     for target in targets {
         reset_peak_memory();
         let before_kib = peak_memory_kib();

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
+use chaic_env::CHAIC_VERSION;
 
 use crate::commands::run_ok;
 
@@ -19,6 +20,8 @@ pub enum Step {
     Shorten(&'static str),
     /// Writes the configuration `c.toml` of a training with this number of steps.
     TrainingConfig(u64),
+    /// Writes the submission of a built-in helper to `mine`.
+    Submission,
 }
 
 /// Way to complete an interrupted command.
@@ -84,7 +87,7 @@ const RUN_READERS: [Reader; 2] = [
 ];
 
 /// All scenarios.
-pub const SCENARIOS: [Scenario; 10] = [
+pub const SCENARIOS: [Scenario; 11] = [
     Scenario {
         name: "run",
         is_long: false,
@@ -158,6 +161,15 @@ pub const SCENARIOS: [Scenario; 10] = [
         readers: &[],
     },
     Scenario {
+        name: "submit",
+        is_long: false,
+        steps: &[GENERATE, Step::Shorten("e"), Step::Submission],
+        command: "submit run mine --episodes e --jobs 1 --out results",
+        outputs: &["results"],
+        recovery: Recovery::Repeat,
+        readers: &[Reader { command: "submit score results --out s.json", is_exact: true }],
+    },
+    Scenario {
         name: "train",
         is_long: false,
         steps: &[COLLECT, Step::TrainingConfig(200)],
@@ -205,6 +217,12 @@ pub const SCENARIOS: [Scenario; 10] = [
 const TRAINING: &str = "warm_up = 1\nbatch_size = 1\nvalidation_max_per_class = 5\n\
                         windows = \"w\"\n[collect]\nepisodes = 1\nimage_size = 32\n";
 
+/// Manifest of the submission of a built-in helper, without the version of chaic.
+const MANIFEST: &str = "version = 1\nname = \"random\"\nrelease = \"1.0\"\nauthors = [\"A. Author\"]\n\
+                        license = \"MIT\"\ndescription = \"Random valid plans.\"\n\
+                        [helper]\nbuilt_in = \"random\"\n[play]\ngrants = [\"ids\", \"goal_place\"]\n\
+                        [training]\nhardware = \"none\"\ncore_hours = 0\n[public]\nsplit = \"standard\"\n";
+
 impl Scenario {
     /// Prepares the inputs in a new folder below `folder`, and returns it.
     ///
@@ -230,9 +248,17 @@ pub fn prepare(steps: &[Step], folder: &Path) -> Result<()> {
             Step::TrainingConfig(steps) => {
                 fs::write(folder.join("c.toml"), format!("steps = {steps}\n{TRAINING}"))?;
             }
+            Step::Submission => write_submission(&folder.join("mine"))?,
         }
     }
     Ok(())
+}
+
+fn write_submission(folder: &Path) -> Result<()> {
+    fs::create_dir(folder)?;
+    let manifest = format!("chaic = \"{CHAIC_VERSION}\"\n{MANIFEST}");
+    fs::write(folder.join("submission.toml"), manifest)?;
+    Ok(fs::write(folder.join("README.md"), "# random\n")?)
 }
 
 /// Splits arguments at spaces.

@@ -67,13 +67,65 @@ fn a_fault_hits_the_temporary_file_of_its_process() {
     assert!(operations.contains(&format!("Rename\t{temporary}\n")), "{operations}");
 }
 
+/// The folder of a submission gets its name after its files are on the device. The command ends before it plays.
+#[test]
+fn a_submission_is_extracted_completely_or_not_at_all() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let mine = at.join("mine");
+    std::fs::create_dir(&mine).expect("the disk has space");
+    let manifest = format!(
+        "version = 1\nname = \"random\"\nrelease = \"1.0\"\nauthors = [\"A. Author\"]\nlicense = \"MIT\"\n\
+         description = \"Random valid plans.\"\nchaic = \"{}\"\n[helper]\nbuilt_in = \"random\"\n\
+         [training]\nhardware = \"none\"\ncore_hours = 0\n[public]\nsplit = \"standard\"\n",
+        env!("CARGO_PKG_VERSION")
+    );
+    std::fs::write(mine.join("submission.toml"), &manifest).expect("the disk has space");
+    let path = |name: &str| at.join(name).to_str().expect("the path is UTF-8").to_owned();
+    let (mine, out, temporary) = (path("mine"), path("out"), path("out/submission.tmp"));
+    // Operations on the temporary folder: create and rename; of an interrupted extraction, remove before.
+    let play = |fault: &str, index: &str| {
+        let plan = ["chaic", "--fault", fault, "--path", &temporary, "--at", index, "--"];
+        let command = ["submit", "run", &mine, "--episodes", "none", "--out", &out];
+        let mut program = Command::new(env!("CARGO_BIN_EXE_chaic-reliability"));
+        // A crash leaves temporary files.
+        let program = program.args(plan).args(command).env("TMPDIR", at);
+        let status = program.output().expect("the program starts").status;
+        assert_eq!(status.code(), Some(86), "{fault}");
+        std::fs::read_to_string(at.join("out/submission/submission.toml")).ok()
+    };
+    assert_eq!(play("crash-before", "1"), None);
+    assert!(at.join("out/submission.tmp/submission.toml").exists());
+    assert_eq!(play("power-failure", "2"), Some(manifest));
+    assert!(!at.join("out/submission.tmp").exists());
+}
+
 #[test]
 fn killed_commands_are_completed() {
     run_ok(&["kills", "merge", "--kills", "1"]);
 }
 
+/// Returns the names of the parsers in a table.
+fn parsers(table: &str) -> Vec<String> {
+    let rows = table.lines().skip(2);
+    rows.filter_map(|row| row.split('|').nth(1)).map(|name| name.trim().to_owned()).collect()
+}
+
+/// Every parser has a corpus.
 #[test]
 fn no_parser_breaks_on_its_corpus_and_a_few_changes() {
-    let table = run_ok(&["fuzz", "--inputs", "100", "--seconds", "600"]);
-    assert!(table.lines().count() > 15, "{table}");
+    let mut tested = parsers(&run_ok(&["fuzz", "--inputs", "100", "--seconds", "600"]));
+    tested.sort();
+    let corpus = std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/corpus"));
+    let folders = corpus.expect("the corpus").map(|entry| entry.expect("an entry").file_name());
+    let mut kept: Vec<String> = folders.filter_map(|name| name.into_string().ok()).collect();
+    kept.sort();
+    assert_eq!(tested, kept);
+}
+
+#[test]
+fn parsers_in_processes_of_their_own_have_rows_in_order() {
+    let options = ["--inputs", "5", "--seconds", "600", "--jobs", "2"];
+    let table = run_ok(&[&["fuzz", "secret", "llm-answer"][..], &options].concat());
+    assert_eq!(parsers(&table), ["llm-answer", "secret"], "{table}");
 }

@@ -13,8 +13,9 @@ use crate::error::{Result, StudyError};
 pub const FORMAT: &str = "chaic-study-data";
 /// Version of the format.
 pub const VERSION: u32 = 1;
-/// Maximum size of a file, bytes: a participation has a few hundred kilobytes.
-const MAX_BYTES: u64 = 64 << 20;
+/// Maximum size of a file, bytes: a participation has a few hundred kilobytes. While a record is parsed, it takes
+/// up to 48 times its size: 32 bytes for a value of 2, in a vector that grows. A file hence takes less than 1 GiB.
+const MAX_BYTES: u64 = 16 << 20;
 /// Maximum number of records: more than the decisions of a day.
 const MAX_RECORDS: usize = 500_000;
 /// Letters and digits of participant codes: those that are not mistaken for each other.

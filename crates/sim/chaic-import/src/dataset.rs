@@ -10,6 +10,10 @@ use serde::Deserialize;
 use crate::axes::{self, Triple};
 use crate::{ImportError, files};
 
+/// Maximum number of episodes of a task and half. The original has 12; each entry of a list can name the same
+/// large files.
+const MAX_EPISODES: usize = 1000;
+
 /// Training or test part of the data set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Half {
@@ -181,7 +185,13 @@ impl TaskFolder {
                 "is missing, expected a folder of episodes",
             ));
         }
-        let entries = files::read(&path.join("test_env.json"))?;
+        let list_path = path.join("test_env.json");
+        let entries: Vec<Entry> = files::read(&list_path)?;
+        if entries.len() > MAX_EPISODES {
+            let problem =
+                format!("has {} episodes, expected at most {MAX_EPISODES}", entries.len());
+            return Err(ImportError::field(&list_path, ".", problem));
+        }
         Ok(TaskFolder { task, path, entries })
     }
 

@@ -4,21 +4,25 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
+use chaic_arena::archive::pack;
 use chaic_core::observation::{Grants, SensorConfig};
 use chaic_core::{AgentId, TaskId};
+use chaic_env::partner_suite::PartnerSuite;
 use chaic_env::{AgentSlot, Env, EpisodeAgents, EpisodeConfig, RunKey};
 use chaic_episodes::{Episode, find_episode};
 use chaic_llm::exchange::{ChatRequest, Exchange, Message, Purpose, Reply, Role, Usage};
 use chaic_llm::record::{RecordEntry, RecordHeader};
 use chaic_llm::templates::Templates;
 use chaic_nn::{Kernel, Network, weights};
+use chaic_study::data::{DataRecord, TrialEnd};
+use chaic_study::{Study, StudyPlan};
 use chaic_subprocess::frame::MessageFrame;
 use chaic_subprocess::message::{PROTOCOL, RequestMessage, observation_frame};
 use chaic_training::checkpoint::{Checkpoint, Identity};
 use serde_json::json;
 
 use crate::commands::run_ok;
-use crate::scenario::{EPISODE_STEPS, PLAY, prepare, words};
+use crate::scenario::{EPISODE_STEPS, PLAY, Step, prepare, words};
 
 /// Kind of the small network in weights files and checkpoints.
 pub const KIND: &str = "fuzz 1";
@@ -33,6 +37,10 @@ pub struct Inputs {
     commitment: PathBuf,
     /// Windows of an opponent model.
     windows: PathBuf,
+    /// Submission of a built-in helper.
+    submission: PathBuf,
+    /// Study of [`Inputs::participant`].
+    pub study: StudyPlan,
     /// Episode of [`Inputs::trace`].
     pub episode: Episode,
 }
@@ -44,6 +52,7 @@ impl Inputs {
     /// If the run fails.
     pub fn new(folder: &Path) -> Result<Inputs> {
         prepare(&EPISODE_STEPS, folder)?;
+        prepare(&[Step::Submission], folder)?;
         run_ok(folder, &words(PLAY))?;
         let scratch = folder.join("scratch");
         fs::create_dir(&scratch)?;
@@ -58,8 +67,9 @@ impl Inputs {
             folder,
             &words("collect opponent --out w --of-each 1 --episodes 1 --image-size 16"),
         )?;
-        let (run, windows) = (folder.join("run"), folder.join("w"));
-        Ok(Inputs { scratch, run, commitment, windows, episode })
+        let [run, windows, submission] = ["run", "w", "mine"].map(|name| folder.join(name));
+        let study = study_plan(folder)?;
+        Ok(Inputs { scratch, run, commitment, windows, submission, study, episode })
     }
 
     /// Reads a file of the run.
@@ -96,6 +106,47 @@ impl Inputs {
         fs::read(&self.commitment).context("no commitment")
     }
 
+    /// Returns manifests of a built-in helper and of a program.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn manifests(&self) -> Result<Vec<Vec<u8>>> {
+        let built_in = fs::read_to_string(self.submission.join("submission.toml"))?;
+        let command = built_in.replace("built_in = \"random\"", "command = [\"sh\", \"a.sh\"]");
+        let command = command + "tasks = [\"obstacle\"]\nn_episodes = 2\n";
+        Ok(vec![built_in.into(), command.into()])
+    }
+
+    /// Returns the archive of a submission.
+    ///
+    /// # Errors
+    /// If the submission cannot be packed.
+    pub fn archive(&self) -> Result<Vec<u8>> {
+        let archive = self.scratch.join("packed.tar");
+        pack(&self.submission, &archive)?;
+        Ok(fs::read(archive)?)
+    }
+
+    /// Returns the file of a participant of [`Inputs::study`].
+    pub fn participant(&self) -> Vec<u8> {
+        let slot = 2;
+        let start = DataRecord::start(self.study.digest(), "K7QXM2RBTA", slot);
+        let mut records = vec![start, DataRecord::Instructed {}];
+        for trial in 0..self.study.trials(slot).len() {
+            records.push(DataRecord::Trial { trial });
+            records.push(DataRecord::Trace { trial, text: "{}\n".to_owned() });
+            records.push(DataRecord::TrialEnd { trial, outcome: TrialEnd::Stopped });
+        }
+        for (name, form) in self.study.forms() {
+            let is_at_end = self.study.study().forms.at_end.iter().any(|due| due == name);
+            let ratings = form.items.iter().map(|item| (item.id.clone(), Some(form.last)));
+            let (position, ratings) = (u32::from(!is_at_end), ratings.collect());
+            records.push(DataRecord::Answers { position, form: name.to_owned(), ratings });
+        }
+        records.push(DataRecord::Complete {});
+        records.iter().map(DataRecord::to_line).collect::<String>().into_bytes()
+    }
+
     /// Returns a trace of [`Inputs::episode`].
     ///
     /// # Errors
@@ -103,6 +154,58 @@ impl Inputs {
     pub fn trace(&self) -> Result<Vec<u8>> {
         self.file("traces/shopping/rhp/gen-0-s0.jsonl")
     }
+}
+
+/// Definition of a study with two conditions and a practice episode.
+const STUDY: &str = r#"title = "Shelves"
+consent = "text.txt"
+instructions = "text.txt"
+debrief = "text.txt"
+completion_code = "SHELVES-7"
+participants = 4
+timeout_minutes = 60
+design = "latin_square"
+practice = ["no_constraint/train/00"]
+episodes = ["high_target/test/00", "high_target/test/01"]
+
+[factors]
+helper = ["none", "rhp"]
+
+[forms]
+after_condition = ["trust"]
+at_end = ["sus"]
+"#;
+
+/// Writes and reads the definition of a study.
+fn study_plan(folder: &Path) -> Result<StudyPlan> {
+    let path = folder.join("study.toml");
+    fs::write(folder.join("text.txt"), "Plain words.\n")?;
+    fs::write(&path, STUDY)?;
+    Ok(StudyPlan::new(Study::read(&path)?, &path)?)
+}
+
+/// Returns lists of partners: the bundled one, and one with drawn and listed habits.
+pub fn partner_lists() -> Vec<Vec<u8>> {
+    let habits = "habits:order=farthest,noise=20,pause=90,memory=300,load=1,containers=no";
+    let partners = json!([
+        {"name": "a", "partner": "drawn:7", "person": "child+tires+speed80"},
+        {"name": "b", "partner": habits},
+    ]);
+    let list = json!({"format": "chaic-partners", "version": 1, "partners": partners});
+    vec![PartnerSuite::bundled().to_json().into_bytes(), list.to_string().into_bytes()]
+}
+
+/// Returns requests of the page of a study for the next picture.
+pub fn turns() -> Vec<Vec<u8>> {
+    let pixel = json!({"pixel": {"column": 3, "row": 4}});
+    let pick_up = json!({"pick_up": {"object": pixel, "hand": "left"}});
+    let turns = [
+        json!({"frames": 15, "view_px": 512}),
+        json!({"frames": 1, "view_px": 64, "input": {"plan": "explore"}}),
+        json!({"frames": 0, "view_px": 128, "input": {"action": pick_up}}),
+        json!({"frames": 240, "view_px": 512, "input": {"action": {"wait": {"frames": 3}}}}),
+    ];
+    turns.map(|turn| turn.to_string().into_bytes()).into()
 }
 
 /// Returns a network with every kind of parameter.

@@ -2,12 +2,14 @@
 
 use std::fmt::Display;
 use std::fs;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::Result;
-use chaic_arena::{Commitment, Secret};
+use chaic_arena::{Commitment, Manifest, Secret, UnpackedSubmission};
 use chaic_core::Action;
+use chaic_env::partner_suite::PartnerSuite;
 use chaic_env::trace;
 use chaic_env::{NoopAgent, Playback};
 use chaic_episodes::Episode;
@@ -25,6 +27,8 @@ use chaic_llm::record::DecisionLog;
 use chaic_llm::templates::Templates;
 use chaic_llm::{Settings, answer};
 use chaic_nn::weights;
+use chaic_study::{ParticipantData, RecordCheck};
+use chaic_study_server::Turn;
 use chaic_subprocess::frame::{MAX_BODY, MessageFrame};
 use chaic_subprocess::message::{PROTOCOL, ResponseMessage, SensorRequest};
 use chaic_subprocess::serve::serve;
@@ -36,6 +40,7 @@ use chaic_vision::train::DetectorLearner;
 use chaic_vision::trained::TrainedDetector;
 use xxhash_rust::xxh3::xxh3_128;
 
+use super::import;
 use super::inputs::{self, Inputs, KIND};
 use super::mutate::Format;
 
@@ -43,6 +48,12 @@ use super::mutate::Format;
 const MAX_FRAMES: usize = 60;
 /// Start of the body of a checkpoint, bytes; its digest lies before.
 const CHECKPOINT_HEAD: usize = MAGIC.len() + 4;
+/// Size of a block of the tar format, bytes.
+const TAR_BLOCK: usize = 512;
+/// Digits of the size of an entry in its header.
+const TAR_SIZE: Range<usize> = 124..135;
+/// Checksum of a header, which counts as spaces in the sum.
+const TAR_CHECKSUM: Range<usize> = 148..156;
 
 /// Parser with its inputs.
 pub struct Target {
@@ -59,7 +70,7 @@ pub struct Target {
 }
 
 /// All parsers.
-pub const TARGETS: [Target; 17] = [
+pub const TARGETS: [Target; 23] = [
     target(
         "episode",
         Format::Json,
@@ -102,6 +113,15 @@ pub const TARGETS: [Target; 17] = [
     },
     target("commitment", Format::Json, |inputs| Ok(vec![inputs.commitment()?]), commitment),
     target("secret", Format::Binary, |_| Ok(vec![[b'a'; 64].to_vec()]), secret),
+    target("manifest", Format::Text, |inputs| inputs.manifests(), manifest),
+    Target {
+        repair: repair_archive,
+        ..target("submission", Format::Binary, |inputs| Ok(vec![inputs.archive()?]), submission)
+    },
+    target("partners", Format::Json, |_| Ok(inputs::partner_lists()), partners),
+    target("study-data", Format::JsonLines, |inputs| Ok(vec![inputs.participant()]), study_data),
+    target("study-turn", Format::Json, |_| Ok(inputs::turns()), study_turn),
+    target("import", Format::JsonLines, |_| Ok(import::seeds()), import::parse),
 ];
 
 const fn target(
@@ -308,4 +328,45 @@ fn commitment(_: &Inputs, bytes: &[u8]) -> Result<(), String> {
 
 fn secret(inputs: &Inputs, bytes: &[u8]) -> Result<(), String> {
     Secret::read(&file(inputs, "secret", bytes)).map(drop).map_err(message)
+}
+
+fn manifest(_: &Inputs, bytes: &[u8]) -> Result<(), String> {
+    Manifest::parse(bytes, Path::new("input")).map(drop).map_err(message)
+}
+
+/// Extracts an archive, and reads the submission in it.
+fn submission(inputs: &Inputs, bytes: &[u8]) -> Result<(), String> {
+    let archive = file(inputs, "submission.tar", bytes);
+    UnpackedSubmission::read(&archive).map(drop).map_err(message)
+}
+
+/// Writes the checksums of the headers of a tar archive.
+fn repair_archive(bytes: &mut [u8]) {
+    let mut at = 0;
+    while let Some(header) = bytes.get_mut(at..at + TAR_BLOCK) {
+        let digits = str::from_utf8(&header[TAR_SIZE]).unwrap_or_default();
+        // The end marker and compressed archives have no size here.
+        let Ok(size) = usize::from_str_radix(digits, 8) else { return };
+        header[TAR_CHECKSUM].fill(b' ');
+        let sum: u32 = header.iter().map(|byte| u32::from(*byte)).sum();
+        header[TAR_CHECKSUM].copy_from_slice(format!("{sum:06o}\0 ").as_bytes());
+        at += TAR_BLOCK + size.next_multiple_of(TAR_BLOCK);
+    }
+}
+
+fn partners(_: &Inputs, bytes: &[u8]) -> Result<(), String> {
+    PartnerSuite::parse(bytes, "input").map(drop).map_err(message)
+}
+
+/// Parses the file of a participant, and checks its records against the plan of the study.
+fn study_data(inputs: &Inputs, bytes: &[u8]) -> Result<(), String> {
+    let data = ParticipantData::parse(bytes, Path::new("input")).map_err(message)?;
+    // The digest depends on the version of chaic, so that of the input is not compared.
+    let mut check = RecordCheck::new(&inputs.study, inputs.study.digest(), data.slot)?;
+    data.records.iter().try_for_each(|(_, record)| check.add(&inputs.study, record))
+}
+
+fn study_turn(_: &Inputs, bytes: &[u8]) -> Result<(), String> {
+    let text = str::from_utf8(bytes).map_err(message)?;
+    Turn::parse(text).map(drop).map_err(message)
 }

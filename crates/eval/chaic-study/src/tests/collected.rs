@@ -11,7 +11,7 @@ use chaic_env::{AdvanceOutcome, AgentSlot, Env, EpisodeAgents, EpisodeConfig};
 use serde_json::{Value, json};
 
 use super::{SMALL, StudyError, StudyPlan, folder_with, plan_of};
-use crate::data::{FORMAT, VERSION};
+use crate::data::{FORMAT, ParticipantData, VERSION};
 use crate::deletion::delete;
 use crate::export::export;
 use crate::study::PERSON;
@@ -233,6 +233,9 @@ fn hostile_files_are_refused_in_one_line() {
         assert!(message.contains(words), "{words}: {message}");
         assert!(!message.contains('\n') && !out.exists(), "{message}");
     }
+    let large = vec![b' '; (16 << 20) + 1];
+    let error = ParticipantData::parse(&large, &path).expect_err("too large").to_string();
+    assert!(error.contains("the file is longer than 16777216 bytes"), "{error}");
     let twice = [write(dir.path(), "a.jsonl", &good), write(dir.path(), "b.jsonl", &good)];
     let message = export(&plan, &twice, &dir.path().join("none")).expect_err("twice").to_string();
     assert!(message.contains("a second file of participant"), "{message}");

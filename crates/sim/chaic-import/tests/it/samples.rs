@@ -344,6 +344,15 @@ fn nan_where_nothing_is_read_is_no_error() {
 }
 
 #[test]
+fn the_number_of_episodes_is_bounded() {
+    let many = |v: &mut Value| *v = json!(vec![v[0].clone(); 1001]);
+    expect_error(
+        |s| s.edit(LIST, many),
+        &["test_env.json", "has 1001 episodes, expected at most 1000"],
+    );
+}
+
+#[test]
 fn duplicate_object_ids_are_refused() {
     let twice = |v: &mut Value| v[3]["id"] = json!(1);
     expect_error(|s| s.edit(COMMANDS, twice), &["1a_0_0.json", "[3].id", "another object"]);

@@ -1,10 +1,11 @@
-//! Promise: the granted state is complete and true, and nothing of it is given without the grant.
+//! Promise: each grant gives its own information and no other. The granted state is complete and true.
 
 use chaic_core::action::{Action, Hand, Outcome};
+use chaic_core::briefing::TaskDisclosure;
 use chaic_core::capability::Persona;
 use chaic_core::geom::Rect;
 use chaic_core::observation::{Granted, Grants, ObjectState};
-use chaic_core::{AgentId, EntityId, ResolvedAction, Vec2, Vec3};
+use chaic_core::{AgentId, ClassId, EntityId, ResolvedAction, TaskId, Vec2, Vec3};
 use chaic_world::{Opening, Room, RoomKind, World};
 
 use crate::common::*;
@@ -57,6 +58,56 @@ fn without_the_grant_neither_state_nor_layout_is_given() {
     assert_eq!(w.briefing(B, others, 0).layout, None);
     assert_eq!(granted(&w, STATE).partner_hands, None, "behavior is not granted");
     assert!(w.briefing(B, STATE, 0).layout.is_some());
+}
+
+#[test]
+fn a_briefing_has_goal_place_goal_task_and_layout_by_their_grants() {
+    let w = rooms();
+    let bed = ClassId::named("bed");
+    for (name, _) in Grants::NONE.named() {
+        let briefing = w.briefing(B, Grants::from_names([name]).expect("a grant"), 0);
+        assert!(briefing.goal_places.contains(&bed));
+        assert_eq!(briefing.goal_places.len() == 1, name == "goal_place", "{name}");
+        assert_eq!(briefing.goal, (name == "goal").then(|| w.setup().goal.clone()), "{name}");
+        let disclosure =
+            TaskDisclosure { task: TaskId::NoConstraint, partner: Persona::Adult.into() };
+        assert_eq!(briefing.disclosure, (name == "task").then_some(disclosure), "{name}");
+        assert_eq!(briefing.layout.is_some(), name == "state", "{name}");
+    }
+}
+
+#[test]
+fn an_observation_has_the_information_of_its_grants() {
+    let mut w = rooms();
+    assert_eq!(run(&mut w, A, pick_up(nth(0), Hand::Left)).0, Outcome::Success);
+    let (partner, helper, apple) = (EntityId::from_agent(A), EntityId::from_agent(B), nth(1));
+    let mut state = w.state().clone();
+    state.objects[2].delivered = Some(0);
+    restore(&mut w, &state);
+    for (name, _) in Grants::NONE.named() {
+        let grants = Grants::from_names([name]).expect("a grant");
+        for in_view in [vec![], vec![partner], vec![partner, apple]] {
+            let seen = w.granted(B, grants, &in_view);
+            let given = |grant: &str, n: usize| if name == grant { n } else { 0 };
+            let (n_people, n_apples) =
+                (in_view.len().min(1), usize::from(in_view.contains(&apple)));
+            assert_eq!(seen.classes.len(), given("ids", in_view.len()), "{name}");
+            let n_delivered = given("ids", n_apples) + given("progress", 1);
+            assert_eq!(seen.delivered.len(), n_delivered, "{name}");
+            assert_eq!(seen.goal.is_some(), name == "goal");
+            assert_eq!(seen.behavior.len(), given("behavior", n_people), "{name}");
+            let n_hands = usize::from(seen.partner_hands.is_some());
+            assert_eq!(n_hands, given("behavior", n_people), "{name}");
+            assert_eq!(seen.poses.len(), given("positions", 2), "{name}");
+            assert_eq!(seen.state.is_some(), name == "state");
+        }
+    }
+    // Each of the two observes the hands of the other.
+    let behavior = Grants { behavior: true, ..Grants::NONE };
+    let hands = |me, other| w.granted(me, behavior, &[other]).partner_hands.expect("in view");
+    let held = hands(B, partner).map(|held| held.map(|held| held.entity));
+    assert_eq!(held, [Some(nth(0)), None]);
+    assert_eq!(hands(A, helper), [None, None]);
 }
 
 #[test]

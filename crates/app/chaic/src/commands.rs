@@ -38,6 +38,7 @@ mod recorded;
 mod run_perception;
 mod sealed;
 mod study_serve;
+mod submit_run;
 mod submitted;
 mod summary;
 

@@ -15,8 +15,8 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use chaic_files::{
-    EntryKind, FileError, create_executable, create_folders, create_folders_below,
-    create_or_replace, kind, remove_folder, rename,
+    EntryKind, FileError, TEMPORARY_SUFFIX, create_executable, create_folders,
+    create_folders_below, create_or_replace, kind, remove_file, remove_folder, rename, with_suffix,
 };
 
 use crate::error::{ArenaError, Result};
@@ -33,34 +33,50 @@ pub const MAX_PATH_BYTES: usize = 200;
 /// Maximum number of names in a path.
 pub const MAX_DEPTH: usize = 8;
 
-/// Extracts an archive into a new folder. The folder appears complete or not at all.
+/// Extracts an archive into a new folder. The folder appears complete or not at all, also after a power
+/// failure.
 ///
-/// Of the recorded attributes only the owner's permission to execute is kept.
+/// Of the recorded attributes only the owner's permission to execute is kept. The content is first written
+/// to a folder with the suffix [`TEMPORARY_SUFFIX`], which replaces that of an interrupted extraction. Two
+/// processes must not extract into the same folder at the same time.
 ///
 /// # Errors
 /// [`ArenaError::Archive`] or [`ArenaError::Entry`] if the archive violates a rule of this module;
 /// [`ArenaError::File`] if `target` exists or cannot be written.
 pub fn extract(archive: &Path, target: &Path) -> Result<()> {
+    check_new(archive, target)?;
+    let temporary = with_suffix(target, TEMPORARY_SUFFIX);
+    match kind(&temporary)? {
+        EntryKind::Missing => {}
+        EntryKind::Folder => remove_folder(&temporary)?,
+        _ => remove_file(&temporary)?,
+    }
+    let folder = Folder { root: &temporary, is_flushed: true };
+    let extracted = folder.fill(archive).and_then(|()| Ok(rename(&temporary, target)?));
+    if extracted.is_err() {
+        // If the removal fails too, the suffix marks the folder as temporary.
+        let _ = remove_folder(&temporary);
+    }
+    extracted
+}
+
+/// Extracts an archive into a new folder whose files do not outlive this process. They are not flushed to
+/// the device, and a failure leaves a part of them.
+///
+/// # Errors
+/// Those of [`extract`].
+pub(crate) fn extract_temporarily(archive: &Path, target: &Path) -> Result<()> {
+    check_new(archive, target)?;
+    Folder { root: target, is_flushed: false }.fill(archive)
+}
+
+/// Checks that `target` does not exist, and reads the whole archive.
+fn check_new(archive: &Path, target: &Path) -> Result<()> {
     if kind(target)? != EntryKind::Missing {
         let error = io::Error::from(io::ErrorKind::AlreadyExists);
         return Err(FileError::context("extract into", target)(error).into());
     }
-    Scan::open(archive)?.run(&mut NullDestination)?;
-    let parent = match target.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    create_folders(parent)?;
-    let temporary = tempfile::Builder::new().prefix(".chaic-extract-").tempdir_in(parent);
-    let temporary = temporary.map_err(FileError::context("make a folder in", parent))?;
-    Scan::open(archive)?.run(&mut Folder { root: temporary.path() })?;
-    make_readable(temporary.path())?;
-    let path = temporary.keep();
-    rename(&path, target).map_err(|error| {
-        // If the removal fails too, the prefix marks the folder as temporary.
-        let _ = remove_folder(&path);
-        error.into()
-    })
+    Scan::open(archive)?.run(&mut NullDestination)
 }
 
 /// Destination that discards all content.
@@ -71,14 +87,29 @@ impl Destination for NullDestination {
         Ok(())
     }
 
-    fn file(&mut self, _: &str, _: bool) -> Result<Box<dyn Write>> {
-        Ok(Box::new(io::sink()))
+    fn file(
+        &mut self,
+        _: &str,
+        _: bool,
+        copy: &mut dyn FnMut(&mut dyn Write) -> Result<()>,
+    ) -> Result<()> {
+        copy(&mut io::sink())
     }
 }
 
 /// Destination that creates files below a folder, which is empty at first.
 struct Folder<'a> {
     root: &'a Path,
+    /// True to flush each file to the device.
+    is_flushed: bool,
+}
+
+impl Folder<'_> {
+    /// Creates the folder with the content of an archive.
+    fn fill(mut self, archive: &Path) -> Result<()> {
+        create_folders(self.root)?;
+        Scan::open(archive)?.run(&mut self)
+    }
 }
 
 impl Destination for Folder<'_> {
@@ -86,27 +117,22 @@ impl Destination for Folder<'_> {
         Ok(create_folders_below(self.root, &self.root.join(path))?)
     }
 
-    fn file(&mut self, path: &str, is_executable: bool) -> Result<Box<dyn Write>> {
+    fn file(
+        &mut self,
+        path: &str,
+        is_executable: bool,
+        copy: &mut dyn FnMut(&mut dyn Write) -> Result<()>,
+    ) -> Result<()> {
         let path = self.root.join(path);
         create_folders_below(self.root, path.parent().unwrap_or(self.root))?;
         let file = if is_executable { create_executable(&path) } else { create_or_replace(&path) };
-        let file = file.map_err(FileError::context("create", &path))?;
-        Ok(Box::new(io::BufWriter::new(file)))
+        let mut file = file.map_err(FileError::context("create", &path))?;
+        copy(&mut file)?;
+        if self.is_flushed {
+            file.sync_all().map_err(FileError::context("write", &path))?;
+        }
+        Ok(())
     }
-}
-
-/// Gives a temporary folder, which only its owner may enter, the permissions of other folders.
-fn make_readable(folder: &Path) -> Result<()> {
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt as _;
-        let permissions = std::fs::Permissions::from_mode(0o755);
-        std::fs::set_permissions(folder, permissions)
-            .map_err(FileError::context("set the permissions of", folder))?;
-    }
-    #[cfg(not(unix))]
-    let _ = folder;
-    Ok(())
 }
 
 /// Returns the error of an archive that is not as this module requires.

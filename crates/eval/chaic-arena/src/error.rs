@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use chaic_episodes::GenerateError;
 use chaic_eval::EvalError;
-use chaic_files::FileError;
+use chaic_files::{FileError, LockError};
+
+use crate::partners::PartnersDigest;
 
 /// Result with an [`ArenaError`].
 pub type Result<T> = std::result::Result<T, ArenaError>;
@@ -15,6 +17,9 @@ pub enum ArenaError {
     /// A file operation failed.
     #[error(transparent)]
     File(#[from] FileError),
+    /// A folder cannot be locked.
+    #[error(transparent)]
+    Lock(#[from] LockError),
     /// An episode cannot be generated.
     #[error(transparent)]
     Generate(#[from] GenerateError),
@@ -50,6 +55,26 @@ pub enum ArenaError {
     OtherEpisodes {
         /// Version of chaic in the commitment.
         sealed_by: String,
+    },
+    /// A run was played with other partners than those of the commitment.
+    #[error(
+        "the run was played with {played}, but the commitment has {committed}; play it with the committed \
+         partners.json"
+    )]
+    OtherPlayedPartners {
+        /// Partners of the run.
+        played: PartnersDigest,
+        /// Partners of the commitment.
+        committed: PartnersDigest,
+    },
+    /// A run was played with a list of partners, but the commitment has no partners.
+    #[error(
+        "the run was played with {played}, but the commitment has none; play it without --partners or with \
+         --partners suite"
+    )]
+    UncommittedPartners {
+        /// Partners of the run.
+        played: PartnersDigest,
     },
     /// The folder of a split holds episodes that are not of the split.
     #[error("{} holds other episodes; choose another folder, or remove them", .0.display())]

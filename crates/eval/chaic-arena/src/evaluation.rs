@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 use chaic_env::helper_registry::HelperRegistry;
 use chaic_eval::EvalError;
 use chaic_eval::metrics::RunResult;
-use chaic_eval::run::RunFolder;
+use chaic_eval::suite::SuiteFolder;
 use chaic_eval::verify::{VerificationReport, verify_run};
-use chaic_files::{EntryKind, kind, read_bounded, write_atomically};
+use chaic_files::{EntryKind, FolderLock, create_folders, kind, read_bounded, write_atomically};
 
 use crate::error::Result;
-use crate::score::{PlayedRun, SubmissionScore};
+use crate::played::PlayedRun;
+use crate::score::SubmissionScore;
 use crate::sealed::Commitment;
 use crate::submission::{Submission, UnpackedSubmission, first_difference};
 
@@ -34,8 +35,10 @@ pub struct EvaluationReport {
     pub score: SubmissionScore,
     /// The run.
     pub run: PlayedRun,
-    /// Verification of the run.
-    pub verification: VerificationReport,
+    /// Number of traces without a difference.
+    pub traces: usize,
+    /// Number of decisions in all traces.
+    pub decisions: usize,
     /// All problems, one line each; empty if the score is confirmed.
     pub problems: Vec<String>,
 }
@@ -43,7 +46,8 @@ pub struct EvaluationReport {
 impl EvaluationReport {
     /// Returns the simulated time of all verified episode runs, frames.
     pub fn simulated_frames(&self) -> u64 {
-        let finished = self.run.results.iter().filter_map(RunResult::summary);
+        let results = self.run.runs().iter().flat_map(|run| &run.results);
+        let finished = results.filter_map(RunResult::summary);
         finished.map(|summary| u64::from(summary.frames)).sum()
     }
 }
@@ -62,9 +66,22 @@ impl Evaluation {
         &self.folder
     }
 
-    /// Returns the folder of the run.
+    /// Returns the folder of the run, which holds a run per partner if it was played with a list.
     pub fn run_folder(&self) -> PathBuf {
         self.folder.join(RUN)
+    }
+
+    /// Returns the folders of the runs: with the ordinary partner, and then with each partner of the list.
+    ///
+    /// # Errors
+    /// If the list of partners cannot be read.
+    pub fn partner_runs(&self) -> Result<Vec<PathBuf>> {
+        let path = self.run_folder();
+        if !SuiteFolder::is_suite(&path) {
+            return Ok(vec![path]);
+        }
+        let folder = SuiteFolder::read(&path)?;
+        Ok(folder.partners().iter().map(|entry| folder.run_path(entry)).collect())
     }
 
     /// Returns the path of the score.
@@ -81,12 +98,14 @@ impl Evaluation {
     /// started with the same submission is continued.
     ///
     /// # Errors
-    /// [`EvalError::Options`] if the folder has another submission; those of
-    /// [`UnpackedSubmission::read`].
+    /// [`EvalError::Options`] if the folder has another submission; [`LockError`](chaic_files::LockError)
+    /// while another process puts one there; those of [`UnpackedSubmission::read`].
     pub fn add_submission(&self, source: &Path) -> Result<Submission> {
         let target = self.folder.join(SUBMISSION);
         // A refused submission leaves no folder.
         let unpacked = UnpackedSubmission::read(source)?;
+        create_folders(&self.folder)?;
+        let _lock = FolderLock::acquire(&self.folder)?;
         if !self.exists() {
             unpacked.extract(&target)?;
             return Submission::read(&target);
@@ -124,8 +143,8 @@ impl Evaluation {
         Ok(write_atomically(&self.score_file(), score.to_json().as_bytes())?)
     }
 
-    /// Re-simulates the run, computes the score again and compares it with `score.json`, byte by byte.
-    /// With a commitment, also compares the played episodes with it.
+    /// Re-simulates the run with each partner, computes the score again and compares it with `score.json`,
+    /// byte by byte. With a commitment, also compares the played episodes and partners with it.
     ///
     /// `helpers` are those of [`verify_run`]; `progress` gets the number of verified traces.
     ///
@@ -141,21 +160,29 @@ impl Evaluation {
         let submission = self.submission()?;
         let run = PlayedRun::read(&self.run_folder())?;
         let score = SubmissionScore::new(&submission, &run)?;
-        let (folder, options) = RunFolder::read(&self.run_folder())?;
-        let verification = verify_run(&folder, &options, helpers, jobs, progress)?;
-        let mut problems: Vec<String> = verification
-            .mismatches
-            .iter()
-            .map(ToString::to_string)
-            .chain(verification.findings.iter().map(ToString::to_string))
-            .collect();
-        if problems.is_empty() {
-            problems.extend(first_difference(&verification));
+        let (mut traces, mut decisions, mut n_checked) = (0, 0, 0);
+        let mut problems = Vec::new();
+        for part in run.runs() {
+            let progress = |n: usize| progress(n_checked + n);
+            let report = verify_run(&part.folder, &part.options, helpers, jobs, &progress)?;
+            n_checked += part.folder.traces()?.len();
+            traces += report.agreeing;
+            decisions += report.decisions;
+            problems.extend(differences(&report));
+        }
+        if let Some(folder) = run.suite() {
+            problems.extend(folder.findings(run.runs())?.iter().map(ToString::to_string));
         }
         problems.extend(self.score_difference(&score)?);
-        let committed = commitment.map_or(Ok(()), |c| c.check_played(&run.episodes));
-        problems.extend(committed.err().map(|error| error.to_string()));
-        Ok(EvaluationReport { score, run, verification, problems })
+        if let Some(commitment) = commitment {
+            let episodes = commitment.check_played(run.episodes());
+            let partners = run
+                .suite()
+                .map_or(Ok(()), |folder| commitment.check_played_partners(folder.suite()));
+            let differing = [episodes, partners].into_iter().filter_map(std::result::Result::err);
+            problems.extend(differing.map(|error| error.to_string()));
+        }
+        Ok(EvaluationReport { score, run, traces, decisions, problems })
     }
 
     /// Compares `score.json` with a score; returns the difference in one line.
@@ -181,5 +208,17 @@ impl Evaluation {
             "{shown}: line {} differs from the score that the traces give",
             n_equal + 1
         )))
+    }
+}
+
+/// Returns all differences that the verification of a run found, one line each.
+fn differences(report: &VerificationReport) -> Vec<String> {
+    let mismatches = report.mismatches.iter().map(ToString::to_string);
+    let findings = report.findings.iter().map(ToString::to_string);
+    let differences: Vec<String> = mismatches.chain(findings).collect();
+    if differences.is_empty() {
+        first_difference(report).into_iter().collect()
+    } else {
+        differences
     }
 }

@@ -9,15 +9,14 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use chaic_env::RunKey;
-use chaic_env::helper_registry::NONE;
+use chaic_env::helper_registry::{NONE, RULES};
 use chaic_eval::metrics::{
     Environments, HelperResults, RunResult, holm, paired_difference, two_sided_p,
 };
-use chaic_eval::run::environments;
 use serde::Serialize;
 
 use crate::evaluation::EvaluationReport;
-use crate::score::{EvaluationConditions, SubmissionScore};
+use crate::score::{EpisodeRunRecord, EvaluationConditions, SubmissionScore};
 use row::csv_line;
 
 /// Format of [`Leaderboard`].
@@ -38,7 +37,7 @@ pub struct Leaderboard {
     pub refused: Vec<RefusedEntry>,
 }
 
-/// Scores under the same rules, on the same episodes.
+/// Scores under the same rules, on the same episodes and with the same partners.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LeaderboardTable {
     /// The rules.
@@ -65,6 +64,7 @@ pub struct RefusedEntry {
 struct ConfirmedEntry {
     folder: String,
     score: SubmissionScore,
+    /// Results that the table compares: with all partners of the list, or with the ordinary partner.
     results: Vec<RunResult>,
     environments: Environments,
 }
@@ -91,9 +91,8 @@ impl LeaderboardBuilder {
             return self.refuse(folder, problem);
         }
         let EvaluationReport { score, run, .. } = report;
-        let environments = environments(&run.planned);
-        let entry =
-            ConfirmedEntry { folder: name(folder), score, results: run.results, environments };
+        let (results, environments) = (run.ranked_results(), run.environments());
+        let entry = ConfirmedEntry { folder: name(folder), score, results, environments };
         self.add_entry(folder, entry);
     }
 
@@ -155,23 +154,27 @@ fn conflict(earlier: &ConfirmedEntry, entry: &ConfirmedEntry) -> Option<String> 
     if a.sha256 == b.sha256 {
         return Some(format!("it is the submission of {}", earlier.folder));
     }
-    let results: BTreeMap<&RunKey, &RunResult> =
-        earlier.results.iter().map(|result| (&result.key, result)).collect();
-    let is_own = |result: &RunResult| [&a.name, &b.name].contains(&&result.key.helper);
-    let others = entry.results.iter().filter(|result| !is_own(result));
-    let differing = others.into_iter().find(|result| {
-        results.get(&result.key).is_some_and(|other| digest(other) != digest(result))
-    })?;
+    let played: BTreeMap<(&str, &RunKey), &EpisodeRunRecord> =
+        earlier.score.records().map(|(partner, run)| ((partner, &run.key), run)).collect();
+    let is_own = |run: &EpisodeRunRecord| [&a.name, &b.name].contains(&&run.key.helper);
+    let (partner, differing) =
+        entry.score.records().filter(|(_, run)| !is_own(run)).find(|(partner, run)| {
+            played
+                .get(&(*partner, &run.key))
+                .is_some_and(|other| last_state(other) != last_state(run))
+        })?;
     let RunKey { episode, helper, seed, .. } = &differing.key;
+    let partner = if partner == RULES { String::new() } else { format!(", partner {partner}") };
     Some(format!(
-        "{episode} with {helper} and seed {seed} ends otherwise than in {}; built-in helpers always play \
-         the same",
+        "{episode} with {helper}{partner} and seed {seed} ends otherwise than in {}; built-in helpers \
+         always play the same",
         earlier.folder
     ))
 }
 
-fn digest(result: &RunResult) -> Option<chaic_env::Digest> {
-    result.summary().map(|summary| summary.digest)
+/// Returns the digest of the last state; `None` for a failed run.
+fn last_state(run: &EpisodeRunRecord) -> Option<chaic_env::Digest> {
+    run.outcome.as_ref().map(|outcome| outcome.state)
 }
 
 fn table(conditions: EvaluationConditions, entries: &[ConfirmedEntry]) -> LeaderboardTable {

@@ -4,8 +4,9 @@
 //! derives the seeds of its episodes and partners from the secret, so they stay unknown until the organizer
 //! publishes it.
 //! Authors send a [`Submission`] in an [`archive`]. An [`Evaluation`] holds its run on the sealed split and
-//! its [`SubmissionScore`], which readers can confirm by re-simulation. A [`Leaderboard`] compares confirmed
-//! scores, in one table for each set of rules. docs/arena.md describes the workflow.
+//! its [`SubmissionScore`], which readers can confirm by re-simulation. A [`PlayedRun`] has a run with each
+//! partner of a list if there is one. A [`Leaderboard`] compares confirmed scores, in one table for each set
+//! of rules and list of partners. docs/arena.md describes the workflow.
 //!
 //! **What it is not**: it starts no program and plays no episode; `chaic submit run` does both. It does not
 //! keep the secret safe; that is up to the organizer.
@@ -21,6 +22,8 @@ mod error;
 mod evaluation;
 pub mod leaderboard;
 mod manifest;
+mod partners;
+mod played;
 mod score;
 mod sealed;
 mod secret;
@@ -32,9 +35,11 @@ pub use leaderboard::Leaderboard;
 pub use manifest::{
     HelperSource, MANIFEST, MAX_MANIFEST_BYTES, Manifest, PlayConditions, PublicPart, Training,
 };
+pub use partners::PartnersDigest;
+pub use played::PlayedRun;
 pub use score::{
-    EpisodeOutcome, EpisodeRunRecord, EvaluationConditions, PlayedRun, SubmissionRecord,
-    SubmissionScore,
+    EpisodeOutcome, EpisodeRunRecord, EvaluationConditions, PartnerScore, PartnersScore,
+    SubmissionRecord, SubmissionScore,
 };
 pub use sealed::{Commitment, SealedSplit};
 pub use secret::{Secret, SecretError};

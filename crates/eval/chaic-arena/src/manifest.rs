@@ -24,6 +24,8 @@ const VERSION: u32 = 1;
 const MAX_LINE_BYTES: usize = 200;
 /// Maximum length of the description, bytes.
 const MAX_DESCRIPTION_BYTES: usize = 1000;
+/// Maximum length of an error of the TOML parser, characters.
+const MAX_PROBLEM_CHARS: usize = 500;
 /// Maximum number of authors.
 const MAX_AUTHORS: usize = 50;
 /// Maximum number of words of a command.
@@ -191,7 +193,6 @@ impl Manifest {
         if self.version != VERSION {
             return Err(format!("`version` is {}, expected {VERSION}", self.version));
         }
-        check_new_name(&self.name, &[], "name = \"mine\"").map_err(|e| format!("`name`: {e}"))?;
         if self.authors.is_empty() || self.authors.len() > MAX_AUTHORS {
             return Err(format!(
                 "`authors` has {} entries, expected 1 to {MAX_AUTHORS}",
@@ -203,7 +204,9 @@ impl Manifest {
             return Err("`release` has other characters than letters, digits and ._-+".to_owned());
         }
         let lines = [
+            ("name", &self.name),
             ("release", &self.release),
+            ("chaic", &self.chaic),
             ("license", &self.license),
             ("training.hardware", &self.training.hardware),
         ];
@@ -212,6 +215,7 @@ impl Manifest {
             check_text(field, line, MAX_LINE_BYTES)?;
         }
         check_text("description", &self.description, MAX_DESCRIPTION_BYTES)?;
+        check_new_name(&self.name, &[], "name = \"mine\"").map_err(|e| format!("`name`: {e}"))?;
         spdx::Expression::parse(&self.license)
             .map_err(|error| format!("`license` is no SPDX expression: {}", error.reason))?;
         if self.chaic != CHAIC_VERSION {
@@ -244,11 +248,11 @@ impl Manifest {
             }
             HelperSource::Policy(path) => check_path(path.as_bytes())
                 .map(drop)
-                .map_err(|problem| format!("`helper.policy`: `{}` {problem}", path.escape_debug())),
+                .map_err(|problem| format!("`helper.policy`: `{}` {problem}", quoted(path))),
             HelperSource::BuiltIn(name) if *name != self.name => Err(format!(
                 "`name` is {}, but a built-in helper keeps its name, `{}`",
                 self.name,
-                name.escape_debug()
+                quoted(name)
             )),
             HelperSource::BuiltIn(_) => Ok(()),
         }
@@ -258,7 +262,7 @@ impl Manifest {
         let PlayConditions { grants, track, perception, behavior } = &self.play;
         for (field, name) in [("perception", perception), ("behavior", behavior)] {
             if !RECOGNITIONS.contains(&name.as_str()) {
-                let (name, known) = (name.escape_debug(), RECOGNITIONS.join(" and "));
+                let (name, known) = (quoted(name), RECOGNITIONS.join(" and "));
                 return Err(format!("`play.{field}` is `{name}`; the choices are {known}"));
             }
         }
@@ -295,12 +299,20 @@ fn check_text(field: &str, text: &str, max_bytes: usize) -> std::result::Result<
     Ok(())
 }
 
-/// Formats an error of the TOML parser on one line, with the line in the file and the field.
+/// Returns a value of the manifest for a message: escaped, and cut after [`MAX_LINE_BYTES`] characters.
+fn quoted(value: &str) -> String {
+    value.escape_debug().take(MAX_LINE_BYTES).collect()
+}
+
+/// Formats an error of the TOML parser on one line, with the line in the file and the field. The error can
+/// quote any part of the file, so control characters become spaces and the text is cut.
 fn located(text: &str, field: &str, error: &toml::de::Error) -> String {
-    let message = error.message().replace('\n', " ");
+    let message = error.message();
     let before = error.span().and_then(|span| text.get(..span.start));
     let line = before.map(|before| format!("line {}", before.matches('\n').count() + 1));
     let field = (!["", "."].contains(&field)).then(|| format!("`{field}`"));
     let place: Vec<String> = line.into_iter().chain(field).collect();
-    if place.is_empty() { message } else { format!("{}: {message}", place.join(", ")) }
+    let place = if place.is_empty() { String::new() } else { place.join(", ") + ": " };
+    let visible = |c: char| if c.is_control() { ' ' } else { c };
+    place.chars().chain(message.chars()).map(visible).take(MAX_PROBLEM_CHARS).collect()
 }

@@ -1,22 +1,27 @@
 //! Score of a submission: its results on a sealed split, with the digests that prove them.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use chaic_agents::perception_factory::GROUND_TRUTH;
 use chaic_core::{Frame, TaskId};
 use chaic_env::helper_registry::RULES;
+use chaic_env::partner_suite::SuitePartner;
 use chaic_env::trace::MAX_TRACE_BYTES;
 use chaic_env::{Appearance, CHAIC_VERSION, Digest, RunKey};
-use chaic_episodes::Episode;
-use chaic_eval::metrics::{FormulaSet, RunResult, Score};
-use chaic_eval::report::{RecordedGrants, Report};
-use chaic_eval::run::{EpisodeJob, RunFolder, RunOptions, planned, read_results};
+use chaic_eval::metrics::{
+    Environments, Estimate, FormulaSet, HelperResults, HelperRobustness, MeanRate, PlayedEpisodes,
+    RunResult, Score, Scores, mean_rate,
+};
+use chaic_eval::report::{Labels, RecordedGrants, Report};
+use chaic_eval::run::{RunFolder, RunOptions};
+use chaic_eval::suite::{PartnerRun, Robustness};
 use chaic_files::read_below;
 use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 
 use crate::error::{ArenaError, Result};
+use crate::partners::PartnersDigest;
+use crate::played::{PlayedRun, pooled};
 use crate::sealed::episodes_sha256;
 use crate::secret::to_hex;
 use crate::submission::Submission;
@@ -40,8 +45,37 @@ pub struct SubmissionScore {
     pub grants: BTreeMap<String, RecordedGrants>,
     /// Grants of the partner.
     pub partner: Option<RecordedGrants>,
-    /// Scores by task and helper.
+    /// Scores by task and helper with the ordinary partner.
     pub tasks: BTreeMap<TaskId, BTreeMap<String, Score>>,
+    /// Result and digests of each episode run with the ordinary partner, sorted by key.
+    pub episode_runs: Vec<EpisodeRunRecord>,
+    /// Results with the partners of a list; absent if only the ordinary partner played.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub partners: Option<PartnersScore>,
+}
+
+/// Results with the partners of a list, without the ordinary partner.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PartnersScore {
+    /// Scores by task and helper over the episode runs with all partners of the list. EI and intervals are
+    /// over episodes; seeds and partners are averaged.
+    pub tasks: BTreeMap<TaskId, BTreeMap<String, Score>>,
+    /// Robustness by helper, as in `robustness.json`.
+    pub robustness: Vec<HelperRobustness>,
+    /// Partners, in the order of the list.
+    pub list: Vec<PartnerScore>,
+}
+
+/// Results with one partner.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PartnerScore {
+    /// Name, agent and change of the person, as in `partners.json`.
+    #[serde(flatten)]
+    pub partner: SuitePartner,
+    /// Grants of the partner.
+    pub grants: Option<RecordedGrants>,
+    /// Mean transport rate by helper over the episodes of all tasks, 0 to 1.
+    pub tr: BTreeMap<String, Estimate>,
     /// Result and digests of each episode run, sorted by key.
     pub episode_runs: Vec<EpisodeRunRecord>,
 }
@@ -92,8 +126,11 @@ pub struct EvaluationConditions {
     /// Side of images, pixels; absent for the size that each helper requests.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size: Option<u32>,
-    /// Agent that drives the partner.
+    /// Agent that drives the ordinary partner.
     pub partner: String,
+    /// Partners of the list, which played too; absent without a list.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub partners: Option<PartnersDigest>,
     /// Change of the partner's body; absent for the people of the episodes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub person: Option<String>,
@@ -131,71 +168,29 @@ pub struct EpisodeOutcome {
     pub trace_sha256: String,
 }
 
-/// The run of a submission on a sealed split, complete and read from its folder.
-#[derive(Debug)]
-pub struct PlayedRun {
-    /// Folder of the run.
-    pub folder: RunFolder,
-    /// Options of the run.
-    pub options: RunOptions,
-    /// All planned episode runs.
-    pub planned: Vec<EpisodeJob>,
-    /// Results, sorted by key.
-    pub results: Vec<RunResult>,
-    /// Episodes, in the order of tasks and numbers.
-    pub episodes: Vec<Episode>,
-}
-
-impl PlayedRun {
-    /// Reads a run in which every episode run is finished or failed.
-    ///
-    /// # Errors
-    /// [`ArenaError::Score`] if episode runs are missing; if a file cannot be read.
-    pub fn read(path: &Path) -> Result<PlayedRun> {
-        let (folder, options) = RunFolder::read(path)?;
-        let planned = planned(&folder, &options)?;
-        let (mut results, warnings) = read_results(&folder.results(), &planned)?;
-        let n_missing = planned.len().saturating_sub(results.len());
-        if n_missing > 0 || !warnings.is_empty() {
-            let problem = match (n_missing, warnings.first()) {
-                (0, Some(warning)) => format!("{warning}; repeat `chaic submit run`"),
-                _ => format!(
-                    "{n_missing} of {} episode runs are missing; repeat `chaic submit run` to play them",
-                    planned.len()
-                ),
-            };
-            return Err(ArenaError::Score { path: path.to_owned(), problem });
-        }
-        results.sort_by(|a, b| a.key.cmp(&b.key));
-        let mut keys: Vec<&RunKey> = planned.iter().map(|job| &job.key).collect();
-        // The numbers of more than 1,000 episodes differ in length.
-        keys.sort_by_key(|key| (key.task, key.episode.len(), &key.episode));
-        keys.dedup_by_key(|key| (key.task, &key.episode));
-        let episodes: std::result::Result<Vec<Episode>, _> =
-            keys.into_iter().map(|key| folder.episode(&options, key)).collect();
-        let episodes = episodes?;
-        Ok(PlayedRun { folder, options, planned, results, episodes })
-    }
-
-    fn conditions(&self) -> EvaluationConditions {
-        let RunOptions { tasks, seeds, rules, rule_overrides, .. } = &self.options;
-        let RunOptions { partner, person, appearance, perception, behavior, .. } = &self.options;
+impl EvaluationConditions {
+    fn new(run: &PlayedRun) -> EvaluationConditions {
+        let RunOptions { tasks, seeds, rules, rule_overrides, .. } = &run.ordinary().options;
+        let RunOptions { track, image_size, partner, person, .. } = &run.ordinary().options;
+        let RunOptions { split, appearance, perception, behavior, .. } = &run.ordinary().options;
         let mut tasks = tasks.clone();
         tasks.sort_unstable();
-        let first = self.episodes.first().map_or("", |episode| episode.id());
+        let episodes = run.episodes();
+        let first = episodes.first().map_or("", |episode| episode.id());
         EvaluationConditions {
             chaic: CHAIC_VERSION.to_owned(),
-            track: self.options.track.to_string(),
+            track: track.to_string(),
             rules: rules.to_string(),
             set: rule_overrides.clone(),
             tasks,
             // Ids are TASK/SPLIT/NUMBER.
-            split: first.split('/').nth(1).unwrap_or(&self.options.split).to_owned(),
-            episodes_sha256: episodes_sha256(&self.episodes),
-            n_episodes: self.episodes.len(),
+            split: first.split('/').nth(1).unwrap_or(split).to_owned(),
+            episodes_sha256: episodes_sha256(episodes),
+            n_episodes: episodes.len(),
             seeds: *seeds,
-            size: self.options.image_size,
+            size: *image_size,
             partner: partner.clone().unwrap_or_else(|| RULES.to_owned()),
+            partners: run.suite().map(|folder| PartnersDigest::new(folder.suite())),
             person: person.map(|change| change.to_string()),
             appearance: appearance.clone().unwrap_or_else(|| Appearance::Canonical.to_string()),
             perception: perception.clone().unwrap_or_else(|| GROUND_TRUTH.to_owned()),
@@ -203,22 +198,69 @@ impl PlayedRun {
         }
     }
 
-    fn record(&self, result: &RunResult) -> Result<EpisodeRunRecord> {
-        let key = result.key.clone();
-        let Some(summary) = result.summary() else {
-            return Ok(EpisodeRunRecord { key, outcome: None });
-        };
-        let path = self.folder.trace(&key);
-        let bytes = read_below(self.folder.path(), &path, MAX_TRACE_BYTES)?;
-        let outcome = EpisodeOutcome {
-            frames: summary.frames,
-            done: summary.done,
-            total: summary.total,
-            state: summary.digest,
-            trace_sha256: to_hex(&Sha256::digest(&bytes)),
-        };
-        Ok(EpisodeRunRecord { key, outcome: Some(outcome) })
+    /// Returns the partners that the ranked scores are over, in words.
+    pub(crate) fn ranked_partners(&self) -> String {
+        match &self.partners {
+            None => self.partner.clone(),
+            Some(partners) => format!("list of {}", partners.n),
+        }
     }
+}
+
+impl PartnersScore {
+    /// Scores the runs with the partners of the list.
+    fn new(run: &PlayedRun) -> Result<PartnersScore> {
+        let (results, environments) = (run.ranked_results(), run.environments());
+        let played =
+            PlayedEpisodes { results: &results, planned: &[], environments: &environments };
+        let list = run.list_runs().iter().map(|partner| PartnerScore::new(partner, &environments));
+        let list: Result<Vec<PartnerScore>> = list.collect();
+        Ok(PartnersScore {
+            tasks: Scores::new(played, &FormulaSet::Paper.formulas()).tasks,
+            robustness: Robustness::from_runs(run.runs()).helpers().to_vec(),
+            list: list?,
+        })
+    }
+}
+
+impl PartnerScore {
+    /// `environments` are those of the episodes with the ordinary partner.
+    fn new(run: &PartnerRun, environments: &Environments) -> Result<PartnerScore> {
+        let granted = run.folder.granted()?;
+        let results = pooled([(run.partner.person, run.results.as_slice())]);
+        let rate = |helper: &String| {
+            let results = HelperResults { results: &results, helper };
+            let MeanRate { mean, interval, .. } = mean_rate(results, environments)?;
+            Some((helper.clone(), Estimate { mean, interval }))
+        };
+        Ok(PartnerScore {
+            partner: run.partner.clone(),
+            grants: Labels { granted: granted.as_ref() }.partner_grants(),
+            tr: run.options.helpers.iter().filter_map(rate).collect(),
+            episode_runs: records(run)?,
+        })
+    }
+}
+
+/// Returns the result and digests of each episode run with one partner, sorted by key.
+fn records(run: &PartnerRun) -> Result<Vec<EpisodeRunRecord>> {
+    run.results.iter().map(|result| record(&run.folder, result)).collect()
+}
+
+fn record(folder: &RunFolder, result: &RunResult) -> Result<EpisodeRunRecord> {
+    let key = result.key.clone();
+    let Some(summary) = result.summary() else {
+        return Ok(EpisodeRunRecord { key, outcome: None });
+    };
+    let bytes = read_below(folder.path(), &folder.trace(&key), MAX_TRACE_BYTES)?;
+    let outcome = EpisodeOutcome {
+        frames: summary.frames,
+        done: summary.done,
+        total: summary.total,
+        state: summary.digest,
+        trace_sha256: to_hex(&Sha256::digest(&bytes)),
+    };
+    Ok(EpisodeRunRecord { key, outcome: Some(outcome) })
 }
 
 impl SubmissionScore {
@@ -228,26 +270,30 @@ impl SubmissionScore {
     /// [`ArenaError::Score`] if the helper of the submission did not play, or played with other grants than
     /// those of its manifest; if a trace cannot be read.
     pub fn new(submission: &Submission, run: &PlayedRun) -> Result<SubmissionScore> {
-        let path = || run.folder.path().to_owned();
         let manifest = submission.manifest();
-        let granted = run.folder.granted()?;
-        let grants = granted.as_ref().and_then(|g| g.helpers.get(&manifest.name)).copied();
-        submission
-            .check_play(&run.options)
-            .and_then(|()| submission.check_grants(grants))
-            .map_err(|problem| ArenaError::Score { path: path(), problem })?;
-        let version = run.folder.version()?.unwrap_or_default();
+        for played in run.runs() {
+            let granted = played.folder.granted()?;
+            let grants = granted.as_ref().and_then(|g| g.helpers.get(&manifest.name)).copied();
+            submission
+                .check_play(&played.options)
+                .and_then(|()| submission.check_grants(grants))
+                .map_err(|problem| {
+                let path = played.folder.path().to_owned();
+                ArenaError::Score { path, problem }
+            })?;
+        }
+        let ordinary = run.ordinary();
+        let granted = ordinary.folder.granted()?;
+        let version = ordinary.folder.version()?.unwrap_or_default();
         let report = Report {
             version: &version,
-            options: &run.options,
-            results: &run.results,
-            planned: &run.planned,
+            options: &ordinary.options,
+            results: &ordinary.results,
+            planned: &ordinary.planned,
             granted: granted.as_ref(),
             formulas: FormulaSet::Paper,
         };
         let labels = report.labels();
-        let records: Result<Vec<EpisodeRunRecord>> =
-            run.results.iter().map(|result| run.record(result)).collect();
         Ok(SubmissionScore {
             format: FORMAT,
             version: VERSION,
@@ -261,12 +307,29 @@ impl SubmissionScore {
                 core_hours: manifest.training.core_hours,
                 sha256: submission.sha256().to_owned(),
             },
-            conditions: run.conditions(),
-            grants: labels.helper_grants(&run.options.helpers).unwrap_or_default(),
+            conditions: EvaluationConditions::new(run),
+            grants: labels.helper_grants(&ordinary.options.helpers).unwrap_or_default(),
             partner: labels.partner_grants(),
             tasks: report.scores().tasks,
-            episode_runs: records?,
+            episode_runs: records(ordinary)?,
+            partners: run.suite().map(|_| PartnersScore::new(run)).transpose()?,
         })
+    }
+
+    /// Returns the scores by task and helper by which leaderboards rank: with all partners of the list, or
+    /// with the ordinary partner if there is no list.
+    pub(crate) fn ranked_tasks(&self) -> &BTreeMap<TaskId, BTreeMap<String, Score>> {
+        self.partners.as_ref().map_or(&self.tasks, |partners| &partners.tasks)
+    }
+
+    /// Returns the records of all episode runs, each with the name of its partner.
+    pub(crate) fn records(&self) -> impl Iterator<Item = (&str, &EpisodeRunRecord)> {
+        let ordinary = self.episode_runs.iter().map(|record| (RULES, record));
+        let list = self.partners.iter().flat_map(|partners| &partners.list);
+        let others = list.flat_map(|score| {
+            score.episode_runs.iter().map(move |record| (score.partner.name.as_str(), record))
+        });
+        ordinary.chain(others)
     }
 
     /// Returns the file content.

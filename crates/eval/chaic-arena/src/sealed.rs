@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::error::ArenaError;
+use crate::partners::PartnersDigest;
 use crate::secret::{Secret, to_hex};
 
 /// Format of [`Commitment`].
@@ -44,17 +45,7 @@ pub struct Commitment {
     episodes_sha256: String,
     /// Partners; absent without any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    partners: Option<CommittedPartners>,
-}
-
-/// Public description of the partners of a sealed split.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct CommittedPartners {
-    /// Number of partners.
-    n: usize,
-    /// SHA-256 of `partners.json`.
-    sha256: String,
+    partners: Option<PartnersDigest>,
 }
 
 impl Commitment {
@@ -114,6 +105,24 @@ impl Commitment {
             return Ok(());
         }
         Err(ArenaError::OtherEpisodes { sealed_by: self.chaic.clone() })
+    }
+
+    /// Checks that a run with several partners played those of the commitment. The bundled suite is public,
+    /// so a split without partners of its own can be played with it.
+    ///
+    /// # Errors
+    /// [`ArenaError::OtherPlayedPartners`] if the partners differ, and [`ArenaError::UncommittedPartners`]
+    /// if the commitment has none.
+    pub fn check_played_partners(&self, suite: &PartnerSuite) -> Result<(), ArenaError> {
+        let played = PartnersDigest::new(suite);
+        match &self.partners {
+            Some(committed) if *committed == played => Ok(()),
+            Some(committed) => {
+                Err(ArenaError::OtherPlayedPartners { played, committed: committed.clone() })
+            }
+            None if *suite == PartnerSuite::bundled() => Ok(()),
+            None => Err(ArenaError::UncommittedPartners { played }),
+        }
     }
 
     /// Checks that this is the commitment to the same partners and episodes.
@@ -202,12 +211,6 @@ impl SealedSplit {
         };
         let partners: Vec<SuitePartner> = (0..self.n_partners).map(partner).collect();
         (!partners.is_empty()).then(|| PartnerSuite::new(partners).expect("drawn ones are valid"))
-    }
-
-    fn committed_partners(&self) -> Option<CommittedPartners> {
-        let suite = self.partners()?;
-        let sha256 = to_hex(&Sha256::digest(suite.to_json()));
-        Some(CommittedPartners { n: self.n_partners, sha256 })
     }
 
     /// Generates the `k`-th episode of a task.
@@ -313,7 +316,7 @@ impl SealedSplit {
             n_episodes: self.n_episodes,
             secret_sha256: self.secret_sha256(),
             episodes_sha256: to_hex(&digest.finalize()),
-            partners: self.committed_partners(),
+            partners: self.partners().as_ref().map(PartnersDigest::new),
         }))
     }
 }
@@ -395,6 +398,10 @@ mod tests {
         assert!(matches!(read.check_content(&other), Err(ArenaError::OtherEpisodes { .. })));
     }
 
+    fn partners_of(split: &SealedSplit) -> PartnerSuite {
+        split.partners().expect("the split has partners")
+    }
+
     #[test]
     fn partners_follow_from_the_secret_alone() {
         let split = |digit| SealedSplit { n_episodes: 1, ..split(digit) }.with_partners(5);
@@ -413,6 +420,18 @@ mod tests {
         read.check_content(&opened).expect("the same partners");
         let (_, fewer) = write(&SealedSplit { tasks, ..split('2').with_partners(4) });
         assert!(matches!(read.check_content(&fewer), Err(ArenaError::OtherPartners { .. })));
+        read.check_played_partners(&partners_of(&split('2'))).expect("the committed partners");
+        let problem = |commitment: &Commitment, played: &PartnerSuite| {
+            commitment.check_played_partners(played).expect_err("other partners").to_string()
+        };
+        for other in [partners_of(&split('3')), PartnerSuite::bundled()] {
+            let problem = problem(&read, &other);
+            assert!(problem.contains("but the commitment has 5 partners (SHA-256 "), "{problem}");
+        }
+        let without = Commitment { partners: None, ..read.clone() };
+        without.check_played_partners(&PartnerSuite::bundled()).expect("the public suite");
+        let problem = problem(&without, &partners_of(&split('2')));
+        assert!(problem.contains("but the commitment has none"), "{problem}");
         let forged = committed.to_json().replace("\"n\": 5", "\"n\": 101");
         assert!(matches!(Commitment::parse(forged.as_bytes()), Err(ArenaError::Format(_))));
     }

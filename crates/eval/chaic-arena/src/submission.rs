@@ -14,7 +14,7 @@ use chaic_eval::verify::{VerificationReport, verify_run_until};
 use chaic_files::{EntryKind, FileError, entries, kind, kind_below, read_bounded};
 use tempfile::TempDir;
 
-use crate::archive::{content_sha256, extract, pack};
+use crate::archive::{content_sha256, extract, extract_temporarily, pack};
 use crate::error::{ArenaError, Result};
 use crate::manifest::{
     HelperSource, MANIFEST, MAX_MANIFEST_BYTES, Manifest, PlayConditions, PublicPart,
@@ -266,7 +266,7 @@ impl UnpackedSubmission {
             pack(source, &archive)?;
         }
         let unpacked = folder.path().join("submission");
-        extract(&archive, &unpacked)?;
+        extract_temporarily(&archive, &unpacked)?;
         let submission = Submission::read_as(&unpacked, source)?;
         Ok(UnpackedSubmission { submission, archive, _folder: folder })
     }

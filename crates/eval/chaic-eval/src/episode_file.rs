@@ -20,7 +20,10 @@ pub fn read_episode_file(path: &Path) -> Result<Vec<u8>> {
 }
 
 /// Reads the `.json` files of a folder that a user named, sorted by id.
-pub(crate) fn read_episode_files(folder: &Path) -> Result<Vec<Episode>> {
+///
+/// # Errors
+/// If the folder or a file can't be read, or a file is no episode.
+pub fn read_episode_files(folder: &Path) -> Result<Vec<Episode>> {
     parse_episode_files(folder, &read_episode_file)
 }
 

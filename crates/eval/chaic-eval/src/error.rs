@@ -87,7 +87,8 @@ pub enum EvalError {
     },
     /// The folder for a new run is not empty.
     #[error(
-        "{path} exists and isn't empty; choose another --out, or resume its run with --resume",
+        "{path} exists and isn't empty; choose another --out, or continue the command that began it \
+         (chaic eval: --resume)",
         path = path.display()
     )]
     NotEmpty {

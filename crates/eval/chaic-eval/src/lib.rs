@@ -51,5 +51,5 @@ pub mod audit;
 pub mod curves;
 pub mod figure;
 
-pub use episode_file::read_episode_file;
+pub use episode_file::{read_episode_file, read_episode_files};
 pub use error::{EvalError, Result};

@@ -13,7 +13,9 @@ use std::path::{Path, PathBuf};
 
 use chaic_env::partner_suite::{MAX_FILE_BYTES, PartnerSuite, SuitePartner};
 use chaic_env::trace::TraceWarning;
-use chaic_files::{EntryKind, create_folders, entries, kind, read_bounded, write_atomically};
+use chaic_files::{
+    EntryKind, TEMPORARY_SUFFIX, create_folders, entries, kind, read_bounded, write_atomically,
+};
 
 use crate::error::{EvalError, Result};
 use crate::metrics::RunResult;
@@ -30,6 +32,12 @@ const REPORT: [&str; 2] = ["robustness.json", "robustness.md"];
 pub struct SuiteFolder {
     path: PathBuf,
     suite: PartnerSuite,
+}
+
+/// Returns whether a file is a list of partners whose writer was stopped. The next writer replaces it.
+fn is_unfinished_list(path: &Path) -> bool {
+    let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    name.strip_prefix(PARTNERS_FILE).is_some_and(|rest| rest.ends_with(TEMPORARY_SUFFIX))
 }
 
 /// Run with one partner of a [`SuiteFolder`].
@@ -65,7 +73,7 @@ impl SuiteFolder {
             folder.check_partners(&suite)?;
             return if folder.unstarted().is_some() { Ok(folder) } else { Err(not_empty()) };
         }
-        if path.exists() && !entries(path)?.is_empty() {
+        if path.exists() && entries(path)?.iter().any(|entry| !is_unfinished_list(entry)) {
             return Err(not_empty());
         }
         create_folders(path)?;

@@ -1,8 +1,9 @@
-//! Export of a split: one JSON file per episode, with a card and metadata.
+//! Export of a split or of episode files: one JSON file per episode, with a card and metadata.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
-use chaic_episodes::{Episode, Split};
+use chaic_episodes::{Episode, GeneratorSeeds, Split, generate_episode};
 use chaic_files::{create_folders, write_atomically};
 
 use crate::card::{DataType, DatasetDescription, Field, FileGroup, Place, RecordSet, common};
@@ -11,18 +12,23 @@ use crate::folder::{NewFolder, write_description};
 
 /// Folder of the episode files within the data set.
 const EPISODES: &str = "episodes";
+/// Version of chaic.
+const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// Returns the name of an episode's file: `obstacle-7.json` for `obstacle/gen/7`, and
 /// `obstacle-standard-007.json` for `obstacle/standard/007`.
 pub fn file_name(id: &str) -> String {
-    id.replace("/gen/", "-").replace('/', "-") + ".json"
+    id.replace("/gen/", "-").replace(['/', ':'], "-") + ".json"
 }
 
-/// Writer of a split. A data set that is not finished is removed.
+/// Writer of a data set of episodes. A data set that is not finished is removed.
 #[derive(Debug)]
 pub struct EpisodeSetWriter {
     folder: NewFolder,
-    n: usize,
+    /// Names of the written files.
+    files: BTreeSet<String>,
+    /// Splits that the episodes name.
+    splits: BTreeSet<String>,
 }
 
 impl EpisodeSetWriter {
@@ -33,49 +39,119 @@ impl EpisodeSetWriter {
     pub fn create(path: &Path) -> Result<EpisodeSetWriter, ExportError> {
         let folder = NewFolder::create(path)?;
         create_folders(&path.join(EPISODES))?;
-        Ok(EpisodeSetWriter { folder, n: 0 })
+        Ok(EpisodeSetWriter { folder, files: BTreeSet::new(), splits: BTreeSet::new() })
     }
 
-    /// Writes an episode.
+    /// Writes an episode from a file, which must be what this version of chaic generates from the seeds that
+    /// it names: license, origin and biases of other episodes are unknown.
     ///
     /// # Errors
-    /// If the file cannot be written.
+    /// [`ExportError::NotGenerated`] if the generator gives another episode; those of
+    /// [`EpisodeSetWriter::add`].
+    pub fn add_from_file(&mut self, episode: &Episode) -> Result<(), ExportError> {
+        if is_generated(episode) {
+            return self.add(episode);
+        }
+        Err(ExportError::NotGenerated(episode.id().to_owned()))
+    }
+
+    /// Writes an episode of a split.
+    ///
+    /// # Errors
+    /// If no generator made the episode, an earlier episode has the same file name, or the file cannot be
+    /// written.
     pub fn add(&mut self, episode: &Episode) -> Result<(), ExportError> {
-        let path = self.folder.path().join(EPISODES).join(file_name(episode.id()));
-        write_atomically(&path, episode.to_json().as_bytes())?;
-        self.n += 1;
-        Ok(())
+        let id = episode.id();
+        if episode.generator().is_none() {
+            return Err(ExportError::NotGenerated(id.to_owned()));
+        }
+        let name = file_name(id);
+        let path = self.folder.path().join(EPISODES).join(&name);
+        if !self.files.insert(name) {
+            return Err(ExportError::RepeatedName(id.to_owned()));
+        }
+        self.splits.insert(episode.split().to_owned());
+        Ok(write_atomically(&path, episode.to_json().as_bytes())?)
     }
 
     /// Writes the card and the metadata; returns the number of episodes. Without episodes, nothing of the
-    /// data set is left.
+    /// data set is left. `split` is absent for episodes from files.
     ///
     /// # Errors
     /// If a file cannot be written.
-    pub fn finish(self, split: &Split) -> Result<usize, ExportError> {
-        if self.n == 0 {
+    pub fn finish(self, split: Option<&Split>) -> Result<usize, ExportError> {
+        let n = self.files.len();
+        if n == 0 {
             return Ok(0);
         }
-        let description = description(split, self.n);
-        write_description(self.folder.path(), "chaic-episodes", &description)?;
+        let origin = match split {
+            Some(split) => Origin::of_split(split),
+            None => Origin::of_files(&self.splits),
+        };
+        write_description(self.folder.path(), "chaic-episodes", &description(origin, n))?;
         self.folder.finish();
-        Ok(self.n)
+        Ok(n)
     }
 }
 
-fn description(split: &Split, n: usize) -> DatasetDescription {
-    let version = env!("CARGO_PKG_VERSION");
+/// Returns whether the generator of this version gives the episode.
+fn is_generated(episode: &Episode) -> bool {
+    let Some(info) = episode.generator() else { return false };
+    let seeds = GeneratorSeeds { place: info.place_seed, episode: info.seed };
+    let (id, split) = (episode.id().to_owned(), episode.split().to_owned());
+    generate_episode(id, split, episode.task(), seeds, info.settings)
+        .is_ok_and(|generated| generated == *episode)
+}
+
+/// Facts about the source of the episodes.
+struct Origin {
+    name: String,
+    collection: String,
+    uses: &'static [&'static str],
+}
+
+impl Origin {
+    fn of_split(split: &Split) -> Origin {
+        Origin {
+            name: split.to_string(),
+            collection: format!(
+                "Generated by the procedural generators of chaic {VERSION} (`chaic export episodes --split \
+                 {split}`). The same version gives the same bytes."
+            ),
+            uses: uses_of(split),
+        }
+    }
+
+    /// `splits` are the splits that the files name, such as `sealed-0a1b2c3d` of a contest.
+    fn of_files(splits: &BTreeSet<String>) -> Origin {
+        let name = match splits.first() {
+            Some(split) if splits.len() == 1 => split.clone(),
+            _ => format!("files of {} splits", splits.len()),
+        };
+        Origin {
+            name,
+            collection: format!(
+                "Copied from episode files (`chaic export episodes --episodes DIR`). The procedural generators of \
+                 chaic {VERSION} give the same bytes from the seeds in the field `generator` of each file."
+            ),
+            uses: &[
+                "Comparison with results on the same episodes, such as those of a contest. A helper that was \
+                 trained or tuned on them cannot be ranked on them.",
+            ],
+        }
+    }
+}
+
+fn description(origin: Origin, n: usize) -> DatasetDescription {
+    let Origin { name, collection, uses } = origin;
     DatasetDescription {
-        title: format!("chaic episodes: {split}"),
+        title: format!("chaic episodes: {name}"),
         summary: format!(
             "Initial states of {n} episodes of the benchmark Constrained Human-AI Cooperation (CHAIC): a simulated \
              person with a constraint carries target objects to a goal place, and a helper assists."
         ),
-        collection: format!(
-            "Generated by the procedural generators of chaic {version} (`chaic export episodes --split {split}`). The \
-             same version gives the same bytes."
-        ),
-        uses: uses_of(split),
+        collection,
+        uses,
         limitations: &[
             "Eight tasks of the paper and four of chaic, each with one partner and one helper.",
             "Rooms and streets are boxes of simple geometry, drawn in plain colors.",
@@ -141,11 +217,64 @@ mod tests {
         let out = folder.path().join("set");
         let split: Split = "gen:0..1".parse().expect("a split");
         let writer = EpisodeSetWriter::create(&out).expect("a new folder");
-        assert_eq!(writer.finish(&split).expect("no file is written"), 0);
+        assert_eq!(writer.finish(Some(&split)).expect("no file is written"), 0);
         assert!(!out.exists());
         let mut writer = EpisodeSetWriter::create(&out).expect("a new folder");
         writer.add(&find_episode("shopping/gen/0").expect("an episode")).expect("a file");
-        assert_eq!(writer.finish(&split).expect("the disk has space"), 1);
+        assert_eq!(writer.finish(Some(&split)).expect("the disk has space"), 1);
         assert!(out.join("README.md").is_file());
+    }
+
+    #[test]
+    fn episodes_of_unknown_origin_or_with_equal_names_are_refused() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let out = folder.path().join("set");
+        let episode = find_episode("shopping/gen/0").expect("an episode");
+        let mut writer = EpisodeSetWriter::create(&out).expect("a new folder");
+        writer.add(&episode).expect("a file");
+        let repeated = writer.add(&episode).expect_err("the same name").to_string();
+        assert!(repeated.contains("shopping/gen/0"), "{repeated}");
+        let setup = episode.into_setup();
+        let own = Episode::new("mine/1", "mine", None, setup).expect("a valid setup");
+        let refused = writer.add(&own).expect_err("no generator").to_string();
+        assert!(
+            refused.starts_with("no generator of this version of chaic made mine/1"),
+            "{refused}"
+        );
+        drop(writer);
+        assert!(!out.exists());
+    }
+
+    #[test]
+    fn only_episodes_of_this_generator_are_taken_from_files() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut writer =
+            EpisodeSetWriter::create(&folder.path().join("set")).expect("a new folder");
+        for id in ["shopping/gen/0", "obstacle/gen-standard/5"] {
+            let generated = find_episode(id).expect("an episode");
+            let parse =
+                |text: &str| Episode::parse(text.as_bytes(), "a.json").expect("it is valid");
+            let text = generated.to_json();
+            let horizon = format!("\"horizon\": {}", generated.setup().horizon);
+            let version = generated.generator().expect("a generator").version;
+            let version = format!("\"version\": {version}");
+            for (from, to) in [(horizon, "\"horizon\": 80"), (version, "\"version\": 99")] {
+                // The first `version` is that of the format.
+                let at = text.rfind(&from).expect(&from);
+                let edited = format!("{}{to}{}", &text[..at], &text[at + from.len()..]);
+                let edited = parse(&edited);
+                let refused = writer.add_from_file(&edited).expect_err(to).to_string();
+                assert!(
+                    refused.contains(&format!("this version of chaic made {id},")),
+                    "{refused}"
+                );
+            }
+            // Names are free: a sealed split has its own.
+            let renamed = parse(&text.replacen(id, &format!("{id}/mine"), 1));
+            for episode in [parse(&text), renamed] {
+                writer.add_from_file(&episode).expect("it is generated");
+            }
+        }
+        assert_eq!(writer.finish(None).expect("the disk has space"), 4);
     }
 }

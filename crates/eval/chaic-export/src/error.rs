@@ -44,6 +44,15 @@ pub enum ExportError {
         /// Frames per second of the export.
         frames_per_s: u32,
     },
+    /// No generator of this version of chaic made the episode.
+    #[error(
+        "no generator of this version of chaic made {0}, so its license and origin are unknown; leave it out, or \
+         describe it by hand"
+    )]
+    NotGenerated(String),
+    /// An earlier episode has the same file name.
+    #[error("two episodes are named like {0}; rename one")]
+    RepeatedName(String),
     /// The episode has no such agent.
     #[error("{0} has no {1}")]
     NoAgent(String, AgentId),
@@ -53,7 +62,11 @@ impl ExportError {
     /// Returns whether the caller's request caused the error.
     pub fn is_usage(&self) -> bool {
         match self {
-            ExportError::Size(_) | ExportError::Rate { .. } | ExportError::NoAgent(..) => true,
+            ExportError::Size(_)
+            | ExportError::Rate { .. }
+            | ExportError::NoAgent(..)
+            | ExportError::NotGenerated(_)
+            | ExportError::RepeatedName(_) => true,
             ExportError::Env(error) => error.is_usage(),
             _ => false,
         }

@@ -1,9 +1,9 @@
-//! Export of recorded runs and of splits as data sets for other programs.
+//! Export of recorded runs and of episodes as data sets for other programs.
 //!
 //! **What it is**: [`lerobot`] exports the observations and actions of an agent from recorded
-//! episodes, in version 3 of the LeRobot format. [`episodes`] exports the initial states of a split.
-//! Each data set has a [`card`] for people and [`croissant`] metadata for programs. [`table`] writes
-//! Parquet files.
+//! episodes, in version 3 of the LeRobot format. [`episodes`] exports the initial states of a split
+//! or of generated episode files. Each data set has a [`card`] for people and [`croissant`] metadata for
+//! programs. [`table`] writes Parquet files.
 //!
 //! **What it is not**: it plays no episodes other than traces, and trains no models.
 //!

@@ -46,6 +46,9 @@ pub struct SubmitCheckArguments {
     /// Archive (.tar, .tar.gz) or folder.
     #[arg(value_name = "SUBMISSION")]
     pub submission: PathBuf,
+    /// Run a program although this system lacks a part of the sandbox; records and tables name the part.
+    #[arg(long)]
+    pub allow_partial_sandbox: bool,
     /// Traces in parallel, 1 to 1024 [default: one per core].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(ranges::JOBS))]
     pub jobs: Option<u16>,
@@ -66,6 +69,13 @@ pub struct SubmitRunArguments {
     /// Play the helper rhp too, as the reference of differences.
     #[arg(long)]
     pub rhp: bool,
+    /// Play with the ordinary partner and with each partner of a list: `suite` or a file, for example
+    /// sealed/partners.json; docs/arena.md.
+    #[arg(long, value_name = "LIST")]
+    pub partners: Option<String>,
+    /// Run a program although this system lacks a part of the sandbox; records and tables name the part.
+    #[arg(long)]
+    pub allow_partial_sandbox: bool,
     /// Episodes in parallel, 1 to 1024; does not change results [default: one per core].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(ranges::JOBS))]
     pub jobs: Option<u16>,
@@ -88,7 +98,8 @@ pub struct SubmitVerifyArguments {
     /// Folder of `chaic submit run`, or the score.json in it.
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
-    /// The published commitment.json: the run must have played exactly its episodes.
+    /// The published commitment.json: the run must have played exactly its episodes, and with a list of
+    /// partners exactly its partners.
     #[arg(long, value_name = "FILE")]
     pub commitment: Option<PathBuf>,
     /// Traces in parallel, 1 to 1024 [default: one per core].
@@ -120,7 +131,7 @@ pub struct LeaderboardBuildArguments {
     /// Title of the page.
     #[arg(long, value_name = "TEXT", default_value = "chaic leaderboard")]
     pub title: String,
-    /// The published commitment.json: runs on other episodes are refused.
+    /// The published commitment.json: runs on other episodes or with another list of partners are refused.
     #[arg(long, value_name = "FILE")]
     pub commitment: Option<PathBuf>,
     /// Traces in parallel, 1 to 1024 [default: one per core].

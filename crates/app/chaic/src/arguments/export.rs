@@ -13,7 +13,7 @@ use super::{Tasks, agent, task, tasks};
 pub enum ExportCommand {
     /// Export a LeRobot data set, version 3: Parquet tables and an MP4 video of each episode.
     Lerobot(LeRobotArguments),
-    /// Export the initial states of a split: a JSON file of each episode, a card and Croissant metadata.
+    /// Export the initial states of episodes: a JSON file each, a card and Croissant metadata.
     Episodes(EpisodesArguments),
 }
 
@@ -21,11 +21,15 @@ pub enum ExportCommand {
 #[derive(Args, Debug)]
 pub struct EpisodesArguments {
     /// Split to export: standard, gen:A..B, gen-standard:A..B, test or train, for example gen:0..100.
-    #[arg(long, value_name = "SPLIT")]
-    pub split: Split,
-    /// Tasks, separated by commas, or `all`.
-    #[arg(long, alias = "tasks", value_name = "NAMES", value_parser = tasks, default_value = "all")]
-    pub task: Tasks,
+    #[arg(long, value_name = "SPLIT", required_unless_present = "episodes")]
+    pub split: Option<Split>,
+    /// Export the generated episode files (*.json) of this folder instead of a split, for example those of an
+    /// opened contest.
+    #[arg(long, value_name = "DIR", conflicts_with = "split")]
+    pub episodes: Option<PathBuf>,
+    /// Tasks, separated by commas, or `all` for those of the paper [default: all, or those of the folder].
+    #[arg(long, alias = "tasks", value_name = "NAMES", value_parser = tasks)]
+    pub task: Option<Tasks>,
     /// An empty folder for the data set, for example my_data.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,

@@ -77,7 +77,7 @@ pub(super) fn run(
 ///
 /// # Errors
 /// If the list or a file that it names can't be read.
-fn read_partners(list: &str, files: &mut GivenPartners) -> Result<PartnerSuite> {
+pub(super) fn read_partners(list: &str, files: &mut GivenPartners) -> Result<PartnerSuite> {
     if list == SUITE {
         return Ok(PartnerSuite::bundled());
     }
@@ -128,13 +128,22 @@ fn start_runs(
     Ok(folder)
 }
 
-/// Returns the folder of runs that are resumed.
-fn resumed(path: &Path, given: Option<&PartnerSuite>) -> Result<SuiteFolder> {
+/// Checks that a folder is no run with one partner.
+///
+/// # Errors
+/// [`EvalError::Options`] if it is one.
+pub(super) fn refuse_single_run(path: &Path) -> Result<()> {
     if RunFolder::is_run(path) {
         let text =
             "is a run with one partner; omit --partners to resume it, or choose another --out";
         return Err(EvalError::Options(format!("{} {text}", path.display())).into());
     }
+    Ok(())
+}
+
+/// Returns the folder of runs that are resumed.
+fn resumed(path: &Path, given: Option<&PartnerSuite>) -> Result<SuiteFolder> {
+    refuse_single_run(path)?;
     if !SuiteFolder::is_suite(path) {
         RunFolder::check_started(path)?;
     }
@@ -174,8 +183,21 @@ fn partner_arguments(
     })
 }
 
-fn partner_request(request: &RunRequest, entry: &SuitePartner) -> RunRequest {
+/// Returns the request of the run with one of the partners.
+pub(super) fn partner_request(request: &RunRequest, entry: &SuitePartner) -> RunRequest {
     RunRequest { partner: entry.partner.clone(), person: entry.person, ..request.clone() }
+}
+
+/// Writes the robustness report of complete runs.
+///
+/// # Errors
+/// If a file can't be read or written.
+pub(super) fn write_robustness(folder: &SuiteFolder) -> Result<Robustness> {
+    let (runs, warnings) = folder.runs()?;
+    warnings.iter().for_each(|warning| print_warning(&warning.to_string()));
+    let robustness = Robustness::from_runs(&runs);
+    folder.write_report(&robustness)?;
+    Ok(robustness)
 }
 
 /// Writes and prints the robustness report of complete runs.
@@ -187,10 +209,7 @@ pub(super) fn print_robustness(
     format: OutputFormat,
     start: Option<Instant>,
 ) -> Result<()> {
-    let (runs, warnings) = folder.runs()?;
-    warnings.iter().for_each(|warning| print_warning(&warning.to_string()));
-    let robustness = Robustness::from_runs(&runs);
-    folder.write_report(&robustness)?;
+    let robustness = write_robustness(folder)?;
     let json = json!({
         "run": folder.path(),
         "report": folder.report_path(),
@@ -198,7 +217,7 @@ pub(super) fn print_robustness(
     });
     let mut text = robustness.text(chaic_eval::report::Format::Table);
     text += &format!("\nReport:  {}\n", quoted_path(&folder.report_path()));
-    let runs = counted(runs.len(), "run");
+    let runs = counted(folder.partners().len(), "run");
     text += &format!("Runs:    {} ({runs}, one per partner)\n", quoted_path(folder.path()));
     if let Some(start) = start {
         let secs = start.elapsed().as_secs();

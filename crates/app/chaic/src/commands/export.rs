@@ -1,13 +1,14 @@
 //! `chaic export`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
-use anyhow::{Result, bail};
-use chaic_episodes::episodes;
-use chaic_eval::EvalError;
+use anyhow::{Context as _, Result, bail};
+use chaic_core::TaskId;
+use chaic_episodes::{Episode, Split, SplitError, episodes};
 use chaic_eval::run::{RunFolder, RunOptions};
 use chaic_eval::verify::verify_trace;
+use chaic_eval::{EvalError, read_episode_files};
 use chaic_export::episodes::EpisodeSetWriter;
 use chaic_export::lerobot::{LeRobotOptions, LeRobotWriter};
 use serde_json::json;
@@ -19,7 +20,7 @@ use crate::exit::ExitStatus;
 use crate::interrupt;
 use crate::output::{OutputFormat, counted, print_error, print_result, print_warning, quoted_path};
 
-/// Exports recorded episodes or a split.
+/// Exports recorded episodes, a split or episode files.
 pub fn run(command: &ExportCommand, format: OutputFormat) -> Result<ExitStatus> {
     match command {
         ExportCommand::Lerobot(arguments) => lerobot(arguments, format),
@@ -28,22 +29,54 @@ pub fn run(command: &ExportCommand, format: OutputFormat) -> Result<ExitStatus> 
 }
 
 fn export_episodes(arguments: &EpisodesArguments, format: OutputFormat) -> Result<ExitStatus> {
-    let EpisodesArguments { split, task, out } = arguments;
-    let total: u64 = task.0.iter().map(|task| split.len_of(*task) as u64).sum();
+    let EpisodesArguments { split, episodes: folder, task, out } = arguments;
+    let tasks = task.as_ref().map(|tasks| tasks.0.clone());
+    if let Some(folder) = folder {
+        let is_selected =
+            |episode: &Episode| tasks.as_ref().is_none_or(|tasks| tasks.contains(&episode.task()));
+        let mut selected = read_episode_files(folder)?;
+        selected.retain(is_selected);
+        if selected.is_empty() {
+            let of_tasks = if tasks.is_some() { " of these tasks" } else { "" };
+            let text = format!("{} holds no episode file (*.json){of_tasks}", folder.display());
+            return Err(EvalError::Options(text).into());
+        }
+        let total = selected.len() as u64;
+        let mut selected = selected.into_iter().map(Ok::<Episode, SplitError>);
+        return write_episodes(out, None, total, &mut selected, format);
+    }
+    let split = split.as_ref().context("give --split or --episodes")?;
+    let tasks = tasks.unwrap_or_else(|| TaskId::paper().collect());
+    let total: u64 = tasks.iter().map(|task| split.len_of(*task) as u64).sum();
     if total == 0 {
         let text = "has no episodes of these tasks, which are not the paper's; choose gen:A..B";
         return Err(EvalError::Options(format!("{split} {text}")).into());
     }
+    let mut generated = tasks.iter().flat_map(|task| episodes(split, *task));
+    write_episodes(out, Some(split), total, &mut generated, format)
+}
+
+/// Writes a data set of episodes; `split` is absent for episodes from files.
+fn write_episodes(
+    out: &Path,
+    split: Option<&Split>,
+    total: u64,
+    episodes: &mut dyn Iterator<Item = Result<Episode, SplitError>>,
+    format: OutputFormat,
+) -> Result<ExitStatus> {
     let stop = interrupt::stop_flag()?;
     let mut writer = EpisodeSetWriter::create(out)?;
     let bar = bars::count_bar(total, "episodes");
     let mut is_complete = true;
-    for episode in task.0.iter().flat_map(|task| episodes(split, *task)) {
+    for episode in episodes {
         if stop.load(Ordering::Relaxed) {
             is_complete = false;
             break;
         }
-        writer.add(&episode?)?;
+        match split {
+            Some(_) => writer.add(&episode?)?,
+            None => writer.add_from_file(&episode?)?,
+        }
         bar.inc(1);
     }
     bar.finish_and_clear();

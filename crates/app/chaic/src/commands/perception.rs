@@ -30,6 +30,9 @@ pub fn evaluate_detection(
         Some(path) => read_detector(path)?,
         None => TrainedDetector::built_in(),
     };
+    if detector.second_stage.is_none() {
+        print_warning("the detector has its first stage only; helpers need both stages");
+    }
     let DetectionArguments { scenes, appearance, .. } = arguments;
     let config = view_config(*scenes, Some(*appearance));
     let stop = interrupt::stop_flag()?;
@@ -123,14 +126,14 @@ fn tracks_text(report: &TrackReport, perception: &str) -> String {
     for (m, recall) in &report.detection_recall_by_m {
         text += &format!("  up to {m:2} m                {}\n", rate(recall));
     }
-    text += &format!(
-        "precision of memory         {}\n\
-         recall of seen objects      {}\n",
-        rate(&report.memory_precision),
-        rate(&report.memory_recall)
-    );
-    for (m, recall) in &report.memory_recall_by_m {
-        text += &format!("  nearest sight up to {m:2} m  {}\n", rate(recall));
+    for (title, all, by_m) in [
+        ("precision of memory   ", &report.memory_precision, &report.memory_precision_by_m),
+        ("recall of seen objects", &report.memory_recall, &report.memory_recall_by_m),
+    ] {
+        text += &format!("{title}      {}\n", rate(all));
+        for (m, rate_at_m) in by_m {
+            text += &format!("  nearest sight up to {m:2} m  {}\n", rate(rate_at_m));
+        }
     }
     text + &format!(
         "identity switches per object {}\n\

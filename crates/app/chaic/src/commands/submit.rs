@@ -1,5 +1,7 @@
 //! `chaic submit`.
 
+use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -10,32 +12,32 @@ use chaic_arena::{
     Commitment, Evaluation, EvaluationReport, HelperSource, Manifest, Submission, SubmissionScore,
     UnpackedSubmission,
 };
-use chaic_core::FRAMES_PER_SECOND;
-use chaic_env::helper_registry::{HelperRegistry, NONE};
-use chaic_eval::report::{rounded, write_files};
-use chaic_eval::run::{FolderMode, Run, RunFolder, RunProgress, RunRequest};
+use chaic_core::{FRAMES_PER_SECOND, TaskId};
+use chaic_env::helper_registry::NONE;
+use chaic_env::partner_suite::SUITE;
+use chaic_eval::metrics::Score;
+use chaic_eval::report::rounded;
+use chaic_eval::run::{RunFolder, RunRequest};
 use chaic_files::write_atomically;
-use chaic_page::{no_language, write_report};
 use chaic_sandbox::Launcher;
 use chaic_subprocess::conformance::check;
-use serde_json::json;
+use serde_json::{Value, json};
 
-use super::bars::RunBars;
-use super::eval_session::{hide_worker_panics, warn_of_run};
+use super::eval_partners::read_partners;
+use super::eval_session::hide_worker_panics;
+use super::given_partners::GivenPartners;
 use super::recorded::RecordedHelpers;
 use super::sealed::read_commitment;
-use super::submitted::SubmittedHelpers;
-use super::summary::report_of;
+use super::submit_run::SubmissionPlayer;
+use super::submitted::{SandboxOptions, SubmittedHelpers};
 use super::{bars, jobs, start_threads};
 use crate::arguments::{
     SubmitCheckArguments, SubmitCommand, SubmitPackArguments, SubmitRunArguments,
     SubmitScoreArguments, SubmitVerifyArguments,
 };
-use crate::exit::{ExitStatus, with_hint};
+use crate::exit::ExitStatus;
 use crate::interrupt;
-use crate::output::{
-    OutputFormat, counted, print, print_error, print_progress, print_result, quoted_path,
-};
+use crate::output::{OutputFormat, counted, print, print_result};
 
 /// Helper that plays as the reference with `--rhp`.
 const RHP: &str = "rhp";
@@ -106,7 +108,9 @@ fn check_submission(
     let mut checks = Checks { format, results: Vec::new() };
     checks.add(&format!("archive, SHA-256 {}", submission.sha256()), None)?;
     checks.add(&format!("manifest of {name} {release}, license {license}"), None)?;
-    check_helper(submission, launcher, stop, &mut checks)?;
+    let allows_partial = arguments.allow_partial_sandbox;
+    let sandbox = SandboxOptions { launcher, masked: &[], allows_partial };
+    check_helper(submission, sandbox, stop, &mut checks)?;
     if stop.load(Ordering::Relaxed) {
         return Ok(ExitStatus::Interrupted);
     }
@@ -154,11 +158,11 @@ fn check_submission(
 /// Checks that the helper loads with the grants of the manifest, and follows the protocol if it is a program.
 fn check_helper(
     submission: &Submission,
-    launcher: &Launcher,
+    sandbox: SandboxOptions<'_>,
     stop: &'static AtomicBool,
     checks: &mut Checks,
 ) -> Result<()> {
-    let helpers = SubmittedHelpers::new(submission, &[], launcher, stop)?;
+    let helpers = SubmittedHelpers::new(submission, sandbox, stop)?;
     let granted = helpers.check_grants(submission);
     let kind = match submission.manifest().helper {
         HelperSource::Command(_) => "program",
@@ -184,14 +188,29 @@ fn play(
     launcher: &Launcher,
 ) -> Result<ExitStatus> {
     let stop = interrupt::stop_flag()?;
+    let list = arguments.partners.as_deref();
+    let mut files = GivenPartners::default();
+    let partners = list.map(|list| read_partners(list, &mut files)).transpose()?;
     let evaluation = Evaluation::at(&arguments.out);
     let submission = evaluation.add_submission(&arguments.submission)?;
-    let masked = [evaluation.run_folder(), arguments.episodes.clone()];
-    let helpers = SubmittedHelpers::new(&submission, &masked, launcher, stop)?;
+    let run = evaluation.run_folder();
+    // The sandbox adds no folder of an installed program that holds one of these paths.
+    let masked: Vec<PathBuf> = [run.clone(), arguments.episodes.clone()]
+        .into_iter()
+        .chain(list.filter(|list| *list != SUITE).map(PathBuf::from))
+        .collect();
+    let allows_partial = arguments.allow_partial_sandbox;
+    let sandbox = SandboxOptions { launcher, masked: &masked, allows_partial };
+    let helpers = SubmittedHelpers::new(&submission, sandbox, stop)?.with_partners(files);
     helpers.check_grants(&submission)?;
     let request = request(&submission, arguments);
+    let jobs = jobs(arguments.jobs);
+    start_threads(jobs)?;
+    hide_worker_panics();
     helpers.with_registry(|registry| {
-        play_run(&evaluation, &request, registry, arguments, stop, format)
+        let (evaluation, run, request) = (evaluation.folder(), run.as_path(), &request);
+        let player = SubmissionPlayer { evaluation, run, request, registry, jobs, stop, format };
+        player.play(partners)
     })
 }
 
@@ -210,83 +229,50 @@ fn request(submission: &Submission, arguments: &SubmitRunArguments) -> RunReques
     }
 }
 
-fn play_run(
-    evaluation: &Evaluation,
-    request: &RunRequest,
-    registry: &dyn HelperRegistry,
-    arguments: &SubmitRunArguments,
-    stop: &'static AtomicBool,
-    format: OutputFormat,
-) -> Result<ExitStatus> {
-    let path = evaluation.run_folder();
-    let (mut run, warnings) = Run::open(&path, FolderMode::Resume, request, registry)?;
-    warn_of_run(&run, &warnings);
-    hide_worker_panics();
-    let extent = run.progress();
-    print_progress(&format!(
-        "{}: {}, helpers {}",
-        path.display(),
-        counted(extent.total, "episode run"),
-        run.options().helpers.join(", ")
-    ));
-    let jobs = jobs(arguments.jobs);
-    start_threads(jobs)?;
-    let mut bars = RunBars::new(extent);
-    let played = run.play(jobs, registry, stop, &mut |event| bars.show(event));
-    bars.clear();
-    let how_to_continue = "the same command continues";
-    if !played.map_err(|error| with_hint(error.into(), how_to_continue))? {
-        let extent = run.progress();
-        let total = counted(extent.total, "episode run");
-        print_error(&format!("stopped after {} of {total}; {how_to_continue}", extent.finished));
-        return Ok(ExitStatus::Interrupted);
-    }
-    let report = report_of(&run);
-    write_files(run.folder(), &report)?;
-    write_report(run.folder(), &report, &no_language)?;
-    let RunProgress { total, errors, .. } = run.progress();
-    let json = json!({ "run": path, "episode_runs": total, "failed": errors });
-    let failed = if errors > 0 { format!("; failed, zero each: {errors}") } else { String::new() };
-    let text = format!(
-        "{}: {}{failed}\nScore: chaic submit score {}\n",
-        path.display(),
-        counted(total, "episode run"),
-        quoted_path(evaluation.folder())
-    );
-    print_result(format, &json, &text)?;
-    Ok(ExitStatus::from_findings(errors > 0))
-}
-
 fn score(arguments: &SubmitScoreArguments, format: OutputFormat) -> Result<ExitStatus> {
     let evaluation = Evaluation::at(&arguments.folder);
     let score = evaluation.score()?;
     let path = arguments.out.clone().unwrap_or_else(|| evaluation.score_file());
     write_atomically(&path, score.to_json().as_bytes())?;
-    let rates = mean_rates(&score);
-    let json = json!({
-        "score": path, "helper": score.submission.name,
-        "tr": rates.iter().map(|(name, rate)| ((*name).to_owned(), json!(rate))).collect::<serde_json::Map<_, _>>(),
+    let rates = mean_rates(&score, &score.tasks);
+    let mut json = json!({
+        "score": path, "helper": score.submission.name, "tr": rates_json(&rates),
     });
-    let rates: Vec<String> =
-        rates.iter().map(|(name, rate)| format!("{name} {}", rounded(*rate))).collect();
-    let text = format!(
+    let mut text = format!(
         "{}: transport rate, mean over {}: {}\n",
         path.display(),
         counted(score.tasks.len(), "task"),
-        rates.join(", ")
+        rates_text(&rates)
     );
+    if let Some(partners) = &score.partners {
+        let rates = mean_rates(&score, &partners.tasks);
+        json["tr_partners"] = rates_json(&rates);
+        let n_partners = counted(partners.list.len(), "partner");
+        text += &format!("With the list of {n_partners}: {}\n", rates_text(&rates));
+    }
     print_result(format, &json, &text)?;
     Ok(ExitStatus::Success)
 }
 
 /// Returns the mean transport rate over tasks of each helper.
-fn mean_rates(score: &SubmissionScore) -> Vec<(&str, f64)> {
+fn mean_rates<'a>(
+    score: &'a SubmissionScore,
+    tasks: &BTreeMap<TaskId, BTreeMap<String, Score>>,
+) -> Vec<(&'a str, f64)> {
     let mean = |name: &str| {
-        let rates: Vec<f64> =
-            score.tasks.values().filter_map(|row| Some(row.get(name)?.tr)).collect();
+        let rates: Vec<f64> = tasks.values().filter_map(|row| Some(row.get(name)?.tr)).collect();
         rates.iter().sum::<f64>() / rates.len().max(1) as f64
     };
     score.grants.keys().map(|name| (name.as_str(), mean(name))).collect()
+}
+
+fn rates_json(rates: &[(&str, f64)]) -> Value {
+    rates.iter().map(|(name, rate)| ((*name).to_owned(), json!(rate))).collect()
+}
+
+fn rates_text(rates: &[(&str, f64)]) -> String {
+    let rates = rates.iter().map(|(name, rate)| format!("{name} {}", rounded(*rate)));
+    rates.collect::<Vec<String>>().join(", ")
 }
 
 fn verify(arguments: &SubmitVerifyArguments, format: OutputFormat) -> Result<ExitStatus> {
@@ -298,15 +284,15 @@ fn verify(arguments: &SubmitVerifyArguments, format: OutputFormat) -> Result<Exi
     let simulated_s = report.simulated_frames() / u64::from(FRAMES_PER_SECOND);
     let json = json!({
         "passed": report.problems.is_empty(),
-        "traces": report.verification.agreeing,
-        "decisions": report.verification.decisions,
+        "traces": report.traces,
+        "decisions": report.decisions,
         "simulated_s": simulated_s,
         "problems": report.problems,
     });
     let mut text: String =
         report.problems.iter().map(|problem| format!("DIFFERS {problem}\n")).collect();
     if report.problems.is_empty() {
-        let (traces, decisions) = (report.verification.agreeing, report.verification.decisions);
+        let (traces, decisions) = (report.traces, report.decisions);
         text = format!(
             "{}: confirmed by {} with {}\n{} min of episodes in {elapsed_s:.1} s: {:.0} times real time\n",
             evaluation.score_file().display(),
@@ -329,10 +315,14 @@ pub(super) fn verify_evaluation(
     commitment: Option<&Commitment>,
     jobs: usize,
 ) -> Result<EvaluationReport> {
-    let path = evaluation.run_folder();
-    let (folder, options) = RunFolder::read(&path)?;
-    let n_traces = folder.traces()?.len();
-    let helpers = RecordedHelpers::new(&path, &options)?;
+    let runs = evaluation.partner_runs()?;
+    let ordinary = runs.first().expect("every evaluation has the run with the ordinary partner");
+    // The runs differ in the partner only, so they have the same helpers.
+    let (_, options) = RunFolder::read(ordinary)?;
+    let helpers = RecordedHelpers::new(ordinary, &options)?;
+    // The verification reports a run that can't be read.
+    let folders = runs.iter().filter_map(|path| Some(RunFolder::read(path).ok()?.0));
+    let n_traces: usize = folders.filter_map(|folder| Some(folder.traces().ok()?.len())).sum();
     let bar = bars::count_bar(n_traces as u64, "traces");
     let progress = |done: usize| bar.set_position(done as u64);
     let report = evaluation.verify(&helpers.registry(), commitment, jobs, &progress);

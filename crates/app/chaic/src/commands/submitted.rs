@@ -10,39 +10,58 @@ use std::sync::atomic::AtomicBool;
 use anyhow::{Result, bail};
 use chaic_arena::{HelperSource, Submission};
 use chaic_env::helper_registry::{BuiltInWithPerception, HelperRegistry, find};
+use chaic_env::recording::RecordedPartners;
 use chaic_env::rules::{RuleSet, RuleSetName};
 use chaic_eval::EvalError;
 use chaic_learn::helpers::{NamedPolicy, PolicyRegistry};
 use chaic_sandbox::Launcher;
-use chaic_subprocess::{CommandRegistry, Confinement, ConfinementOptions, HelperProgram, Limits};
+use chaic_subprocess::{
+    CommandRegistry, Confinement, ConfinementOptions, HelperProgram, Limits, Refusal,
+};
 
+use super::given_partners::GivenPartners;
 use super::run_perception::perception_by_name;
 use crate::output::{print_warning, quoted};
+
+/// Sandbox of the program of a submission.
+#[derive(Clone, Copy)]
+pub(super) struct SandboxOptions<'a> {
+    /// Program that starts the stages of the sandbox.
+    pub launcher: &'a Launcher,
+    /// Folders that stay empty for the program, and files whose folders are never added for it.
+    pub masked: &'a [PathBuf],
+    /// True if parts of the sandbox may be missing on this system.
+    pub allows_partial: bool,
+}
 
 /// Helpers of a run with a submission.
 pub(super) struct SubmittedHelpers {
     built_in: BuiltInWithPerception,
     program: Option<HelperProgram>,
     policy: Option<(String, PathBuf)>,
+    /// Partners from files.
+    partners: GivenPartners,
     stop: &'static AtomicBool,
 }
 
 impl SubmittedHelpers {
-    /// Prepares the helper of a submission. Its processes cannot read the folders `masked`.
+    /// Prepares the helper of a submission.
     ///
     /// # Errors
-    /// If the sandbox does not start, or the perception cannot be loaded.
+    /// [`Refusal`] if the sandbox of a program does not start or lacks a part that is required; if the
+    /// perception cannot be loaded.
     pub fn new(
         submission: &Submission,
-        masked: &[PathBuf],
-        launcher: &Launcher,
+        sandbox: SandboxOptions<'_>,
         stop: &'static AtomicBool,
     ) -> Result<SubmittedHelpers> {
         let manifest = submission.manifest();
         let play = &manifest.play;
         let perception = perception_by_name(Some(&play.perception), Some(&play.behavior))?;
         let built_in = BuiltInWithPerception { perception };
-        let mut helpers = SubmittedHelpers { built_in, program: None, policy: None, stop };
+        let partners = GivenPartners::default();
+        let mut helpers =
+            SubmittedHelpers { built_in, program: None, policy: None, partners, stop };
         match &manifest.helper {
             HelperSource::BuiltIn(_) => {}
             HelperSource::Policy(path) => {
@@ -50,10 +69,15 @@ impl SubmittedHelpers {
                 helpers.policy = Some((manifest.name.clone(), path));
             }
             HelperSource::Command(words) => {
-                helpers.program = Some(program(submission, words, masked, launcher)?);
+                helpers.program = Some(program(submission, words, sandbox)?);
             }
         }
         Ok(helpers)
+    }
+
+    /// Adds partners from files.
+    pub fn with_partners(self, partners: GivenPartners) -> SubmittedHelpers {
+        SubmittedHelpers { partners, ..self }
     }
 
     /// Returns the program of the submission, if it has one.
@@ -72,8 +96,10 @@ impl SubmittedHelpers {
         let perception = Arc::clone(&self.built_in.perception);
         let policies: chaic_env::Result<Vec<NamedPolicy>> =
             self.policy.iter().map(|(name, file)| NamedPolicy::read(name, file)).collect();
-        let policies =
-            PolicyRegistry::bundled(&self.built_in, perception).with_policies(policies?)?;
+        let policies = PolicyRegistry::bundled(&self.built_in, perception)
+            .with_partners(&self.partners.policies)
+            .with_policies(policies?)?;
+        let policies = RecordedPartners::new(&policies, &self.partners.recordings);
         let programs = self.program.clone().into_iter().collect();
         play(&CommandRegistry::new(&policies, programs, self.stop)?)
     }
@@ -106,9 +132,9 @@ impl SubmittedHelpers {
 fn program(
     submission: &Submission,
     words: &[String],
-    masked: &[PathBuf],
-    launcher: &Launcher,
+    sandbox: SandboxOptions<'_>,
 ) -> Result<HelperProgram> {
+    let SandboxOptions { launcher, masked, allows_partial } = sandbox;
     let manifest = submission.manifest();
     let folder = std::path::absolute(submission.helper_folder())?;
     let Some(folder_text) = folder.to_str() else {
@@ -125,8 +151,19 @@ fn program(
     };
     let installed = installed_program(&words[0]);
     let confinement = Confinement::new(launcher, installed, &limits, &options)?;
-    if let Some(missing) = confinement.warning() {
-        print_warning(&format!("{} runs in {missing}", manifest.name));
+    match confinement.warning() {
+        None => {}
+        Some(partial) if allows_partial => {
+            print_warning(&format!("{} runs in {partial}", manifest.name));
+        }
+        Some(partial) => {
+            return Err(Refusal(format!(
+                "{} would run in {partial}, but a submission needs the whole sandbox; use another system, or \
+                 give --allow-partial-sandbox",
+                manifest.name
+            ))
+            .into());
+        }
     }
     Ok(HelperProgram {
         name: manifest.name.clone(),

@@ -1,5 +1,6 @@
 //! Promises on contests: a submission is checked, played, scored and verified by the documented commands. An altered
-//! trace or score is found, and keeps its submission out of the leaderboard. A submission reads its own files only.
+//! trace or score is found, and keeps its submission out of the leaderboard. A submission reads its own files only,
+//! gives the same score in every folder, and needs the whole sandbox.
 
 use std::fs;
 use std::path::Path;
@@ -7,6 +8,8 @@ use std::process::Output;
 
 use assert_cmd::cargo::cargo_bin;
 
+#[cfg(target_os = "linux")]
+use super::sandbox::output_without_namespaces;
 use super::{command, run_ok, short_episodes, shorten, text};
 
 /// Runs `chaic` with its own folder in the search path, so that a submission can name it as an installed program.
@@ -49,6 +52,9 @@ fn write_manifest(folder: &Path, name: &str, helper: &str, grants: &str) {
     fs::write(folder.join("submission.toml"), manifest).expect("the disk has space");
 }
 
+/// Option with which a program also plays on systems without a whole sandbox.
+const PARTIAL: &str = "--allow-partial-sandbox";
+
 const GRANTS: &str = "\"ids\", \"goal_place\"";
 
 /// Arguments of a public run.
@@ -86,7 +92,7 @@ fn a_contest_from_end_to_end() {
     let dir = short_episodes();
     let at = dir.path();
     write_program(at);
-    let checked = succeed(at, &["submit", "check", "mine"]);
+    let checked = succeed(at, &["submit", "check", "mine", PARTIAL]);
     for words in ["ok      archive, SHA-256 ", "it exits after `bye`", "public run: 2 traces"] {
         assert!(checked.contains(words), "{words}: {checked}");
     }
@@ -96,7 +102,8 @@ fn a_contest_from_end_to_end() {
     let [first, again] = ["mine.tar", "again.tar"].map(|name| fs::read(at.join(name)));
     assert!(first.expect("an archive") == again.expect("an archive"));
 
-    let play = ["submit", "run", "mine.tar", "--rhp", "--out", "results/mine", "--episodes"];
+    let play =
+        ["submit", "run", "mine.tar", PARTIAL, "--rhp", "--out", "results/mine", "--episodes"];
     let unscored = fail(at, &["submit", "score", "results/mine"]);
     assert!(unscored.contains("results/mine"), "{unscored}");
     let played = succeed(at, &[&play[..], &["short"]].concat());
@@ -208,7 +215,7 @@ fn a_submission_reads_its_own_files_only() {
     let script = "cat words; cat \"$@\" ../../run/run.json ../submission.toml; exit 1";
     fs::write(at.join("spy/helper/spy.sh"), format!("{{ {script}; }} >&2")).expect("it has space");
     fs::write(at.join("spy/helper/words"), "words-are-here").expect("the disk has space");
-    let played = ["submit", "run", "spy", "--episodes", "short", "--out", "results/spy"];
+    let played = ["submit", "run", "spy", PARTIAL, "--episodes", "short", "--out", "results/spy"];
     let message = fail(at, &played);
     assert!(message.contains("failed, zero each: 2"), "{message}");
     let results = fs::read_to_string(at.join("results/spy/run/results.jsonl")).expect("results");
@@ -222,4 +229,65 @@ fn a_submission_reads_its_own_files_only() {
     // Failed runs score zero, and the score is confirmed.
     succeed(at, &["submit", "score", "results/spy"]);
     succeed(at, &["submit", "verify", "results/spy"]);
+}
+
+/// Writes the submission of a program, `mine`, without a public run: the example in Python, or an installed program on
+/// systems without Python.
+fn write_unchecked_program(at: &Path) {
+    let python = std::process::Command::new("python3").arg("--version").output();
+    let words = match python {
+        Ok(out) if out.status.success() => r#""python3", "helper.py""#,
+        _ => r#""chaic", "helper", "serve", "random""#,
+    };
+    write_manifest(&at.join("mine"), "mine", &format!("command = [{words}]"), GRANTS);
+    let helper = at.join("mine/helper");
+    fs::create_dir_all(&helper).expect("the disk has space");
+    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../examples/python_helper");
+    for file in ["chaic_helper.py", "helper.py"] {
+        fs::copy(example.join(file), helper.join(file)).expect("the disk has space");
+    }
+}
+
+#[test]
+fn the_same_archive_gives_the_same_score_in_another_folder() {
+    let dir = tempfile::tempdir().expect("the disk has space");
+    let at = dir.path();
+    let generate = ["episodes", "generate", "--task", "no_constraint", "--seeds", "0..1"];
+    run_ok(at, &[&generate[..], &["--out", "short"]].concat());
+    shorten(&at.join("short"));
+    write_unchecked_program(at);
+    succeed(at, &["submit", "pack", "mine", "--out", "mine.tar"]);
+    let [first, second] = [("first", "1"), ("second", "2")].map(|(out, jobs)| {
+        let play = ["submit", "run", "mine.tar", PARTIAL, "--episodes", "short", "--out", out];
+        succeed(at, &[&play[..], &["--jobs", jobs]].concat());
+        succeed(at, &["submit", "score", out]);
+        fs::read_to_string(at.join(out).join("score.json")).expect("a score")
+    });
+    assert!(first.contains("\"trace_sha256\""), "{first}");
+    assert_eq!(first, second);
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_program_needs_the_whole_sandbox_or_the_option_of_the_organizer() {
+    let dir = short_episodes();
+    let at = dir.path();
+    write_manifest(&at.join("mine"), "mine", r#"command = ["sh", "helper.sh"]"#, "");
+    fs::create_dir_all(at.join("mine/helper")).expect("the disk has space");
+    fs::write(at.join("mine/helper/helper.sh"), "exit 1").expect("the disk has space");
+    let play = ["submit", "run", "mine", "--episodes", "short", "--out", "results"];
+    for refused in [&play[..], &["submit", "check", "mine"]] {
+        let Some(out) = output_without_namespaces(at, refused) else { return };
+        let message = text(&out.stderr);
+        assert_eq!(out.status.code(), Some(2), "{message}");
+        let expected = "error: mine would run in a sandbox without namespaces";
+        assert!(message.contains(expected) && message.contains(PARTIAL), "{message}");
+        assert_eq!(message.lines().count(), 1, "{message}");
+    }
+    assert!(!at.join("results/run").exists());
+    let out = output_without_namespaces(at, &[&play[..], &[PARTIAL]].concat()).expect("as before");
+    let message = text(&out.stderr);
+    assert!(message.contains("warning: mine runs in a sandbox without namespaces"), "{message}");
+    let run = fs::read_to_string(at.join("results/run/run.json")).expect("a run");
+    assert!(run.contains(r#""mine": "sandbox without namespaces"#), "{run}");
 }

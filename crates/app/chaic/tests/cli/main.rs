@@ -8,6 +8,7 @@ use assert_cmd::cargo::cargo_bin;
 
 mod beliefs;
 mod contest;
+mod contest_partners;
 mod files;
 mod help;
 mod interrupted;

@@ -90,6 +90,15 @@ fn a_sealed_split_is_played_and_opened_by_its_secret_alone() {
     let [sealed, opened] = partners.map(|bytes| bytes.expect("a list of partners"));
     assert!(sealed == opened && sealed.starts_with(b"{"));
 
+    // The opened split has a card and metadata.
+    run_ok(at, &["export", "episodes", "--episodes", "opened", "--out", "set"]);
+    let name = json["split"].as_str().expect("a name");
+    let exported = format!("set/episodes/obstacle-{name}-000.json");
+    assert!(fs::read(at.join(exported)).expect("an episode") == episode);
+    let card = fs::read_to_string(at.join("set/README.md")).expect("a card");
+    assert!(card.contains(&format!("# chaic episodes: {name}\n\nInitial states of 2")), "{card}");
+    assert!(card.contains("--episodes DIR") && at.join("set/croissant.json").is_file(), "{card}");
+
     // Partners that are not committed would be played with the split.
     let refused = run_err(at, &[&seal[..], &["--n-episodes", "1", "--out", "sealed"]].concat());
     assert!(refused.contains("partners.json belongs to another split"), "{refused}");

@@ -25,8 +25,13 @@ pub(super) trait Destination {
     /// Creates a folder.
     fn folder(&mut self, path: &str) -> Result<()>;
 
-    /// Creates a file and returns the writer of its content.
-    fn file(&mut self, path: &str, is_executable: bool) -> Result<Box<dyn Write>>;
+    /// Creates a file. `copy` writes its content.
+    fn file(
+        &mut self,
+        path: &str,
+        is_executable: bool,
+        copy: &mut dyn FnMut(&mut dyn Write) -> Result<()>,
+    ) -> Result<()>;
 }
 
 /// Reader of one archive.
@@ -134,9 +139,9 @@ impl Scan<'_> {
         if is_folder {
             return destination.folder(&path);
         }
-        // Executable by its owner.
-        let mut output = destination.file(&path, mode & 0o100 != 0)?;
-        self.copy(size, &path, &mut output)
+        let is_executable_by_owner = mode & 0o100 != 0;
+        destination
+            .file(&path, is_executable_by_owner, &mut |output| self.copy(size, &path, output))
     }
 
     /// Copies the content of an entry, and skips the rest of its last block.
@@ -151,7 +156,7 @@ impl Scan<'_> {
             written = output.write_all(&chunk[..n]);
             left -= n as u64;
         }
-        written.and_then(|()| output.flush()).map_err(write_error)?;
+        written.map_err(write_error)?;
         let padding = (BLOCK as u64 - size % BLOCK as u64) % BLOCK as u64;
         self.fill_exactly(&mut chunk[..padding as usize])
     }

@@ -2,6 +2,7 @@
 
 use chaic_core::TaskId;
 use chaic_env::helper_registry::NONE;
+use chaic_eval::metrics::{Estimate, HelperRobustness};
 use chaic_eval::report::{number, rounded};
 use chaic_page::{STYLE, data_link};
 use minijinja::value::Serde;
@@ -27,7 +28,24 @@ struct TableView {
     terms: Vec<(&'static str, String)>,
     tasks: Vec<&'static str>,
     reference: String,
+    /// Number of partners of the list in words; absent without a list.
+    partners: Option<String>,
     rows: Vec<RowView>,
+    /// Gains with the partners of the list; empty without a list.
+    robustness: Vec<RobustnessView>,
+}
+
+/// Robustness of a helper as texts.
+#[derive(Debug, Serialize)]
+struct RobustnessView {
+    title: String,
+    is_submission: bool,
+    ordinary: String,
+    list_gain: String,
+    share_kept: String,
+    worst_partner: String,
+    worst_tenth: String,
+    worst_tenth_ordinary: String,
 }
 
 /// Row as texts; an absent text is undefined.
@@ -65,11 +83,13 @@ pub(super) fn render(leaderboard: &Leaderboard, title: &str) -> String {
     let (name, source) = TEMPLATE;
     environment.add_template(name, source).expect("the template is valid");
     let tables: Vec<TableView> = leaderboard.tables.iter().map(TableView::new).collect();
+    let has_partners = tables.iter().any(|table| table.partners.is_some());
     let refused: Vec<RefusedEntry> = leaderboard.refused.clone();
     let template = environment.get_template(name).expect("it was added above");
     let values = context! {
         title,
         tables => Serde(tables),
+        has_partners,
         refused => Serde(refused),
         style => STYLE,
         table_style => TABLE_STYLE,
@@ -85,8 +105,15 @@ impl TableView {
         let is_reference =
             |row: &&LeaderboardRow| row.sha256.is_none() && row.name == table.reference;
         let reference = table.rows.iter().find(is_reference);
+        let partners = rules.partners.as_ref().map(|partners| match partners.n {
+            1 => "1 partner".to_owned(),
+            n => format!("{n} partners"),
+        });
+        let heading_suffix =
+            partners.as_ref().map_or(String::new(), |partners| format!(", {partners}"));
+        let robustness = table.rows.iter();
         TableView {
-            heading: format!("{}, {} track", rules.split, rules.track),
+            heading: format!("{}, {} track{heading_suffix}", rules.split, rules.track),
             terms: terms(table),
             tasks: rules.tasks.iter().map(|task| task.info().title).collect(),
             reference: match reference {
@@ -94,6 +121,28 @@ impl TableView {
                 _ => "no helper".to_owned(),
             },
             rows: table.rows.iter().map(|row| RowView::new(table, row)).collect(),
+            robustness: robustness
+                .filter_map(|row| Some(RobustnessView::new(row, row.robustness.as_ref()?)))
+                .collect(),
+            partners,
+        }
+    }
+}
+
+impl RobustnessView {
+    fn new(row: &LeaderboardRow, robustness: &HelperRobustness) -> RobustnessView {
+        let HelperRobustness { ordinary, suite, share_kept, .. } = robustness;
+        let worst = robustness.worst_partner().map(|worst| (&worst.partner, worst.gain.mean));
+        RobustnessView {
+            title: title_of(row),
+            is_submission: row.sha256.is_some(),
+            ordinary: estimate(Some(&ordinary.gain)),
+            list_gain: estimate(Some(suite)),
+            share_kept: estimate(share_kept.as_ref()),
+            worst_partner: worst
+                .map_or_else(|| number(None), |(name, gain)| format!("{name} {}", rounded(gain))),
+            worst_tenth: estimate(Some(&robustness.worst_decile)),
+            worst_tenth_ordinary: estimate(Some(&robustness.worst_decile_ordinary)),
         }
     }
 }
@@ -106,21 +155,25 @@ fn terms(table: &LeaderboardTable) -> Vec<(&'static str, String)> {
         [] => rules.rules.clone(),
         _ => format!("{} with {}", rules.rules, rules.set.join(", ")),
     };
-    vec![
+    let mut terms = vec![
         ("Split", format!("{}, {} episodes", rules.split, rules.n_episodes)),
         ("Episodes, SHA-256", rules.episodes_sha256.clone()),
         ("Environments", table.environments.to_string()),
         ("Seeds per episode", rules.seeds.to_string()),
         ("Track", rules.track.clone()),
         ("Rules", rule_set),
-        ("Partner", rules.partner.clone()),
+        ("Partner", rules.ranked_partners()),
         ("Person", rules.person.clone().unwrap_or_else(|| "as in the episodes".to_owned())),
         ("Appearance", rules.appearance.clone()),
         ("Perception", rules.perception.clone()),
         ("Behavior recognition", rules.behavior.clone()),
         ("Images", size),
         ("chaic", rules.chaic.clone()),
-    ]
+    ];
+    if let Some(partners) = &rules.partners {
+        terms.push(("Partners, SHA-256", partners.sha256.clone()));
+    }
+    terms
 }
 
 /// Returns the title of a row.
@@ -155,7 +208,7 @@ impl RowView {
             grants: grants.filter(|names| !names.is_empty()).unwrap_or_else(|| "none".to_owned()),
             perception: perception(row),
             track: table.conditions.track.clone(),
-            partner: table.conditions.partner.clone(),
+            partner: table.conditions.ranked_partners(),
             failed: row.failed,
             version: version.unwrap_or_default(),
             license: row.license.clone(),
@@ -177,6 +230,15 @@ fn perception(row: &LeaderboardRow) -> String {
     });
     let isolation = granted.isolation.clone().filter(|isolation| isolation != "sandbox");
     parts.chain(isolation).collect::<Vec<_>>().join(", ")
+}
+
+/// Formats an estimate with its interval, or as undefined.
+fn estimate(estimate: Option<&Estimate>) -> String {
+    let mean = number(estimate.map(|estimate| estimate.mean));
+    match estimate.and_then(|estimate| estimate.interval) {
+        Some(ends) => format!("{mean} ({})", interval([ends.low, ends.high])),
+        None => mean,
+    }
 }
 
 fn interval([low, high]: [f64; 2]) -> String {

@@ -3,13 +3,16 @@
 use std::collections::BTreeMap;
 
 use chaic_core::TaskId;
-use chaic_eval::metrics::{HelperResults, Interval, MeanRate, Score, mean_rate};
+use chaic_eval::metrics::{
+    Estimate, HelperResults, HelperRobustness, Interval, MeanRate, Score, mean_rate,
+};
 use chaic_eval::report::{RecordedGrants, csv_text, title};
 use serde::Serialize;
 
 use super::{ConfirmedEntry, LeaderboardTable};
 
-/// Score of a helper in a leaderboard.
+/// Score of a helper in a leaderboard. In a table with a list of partners, rates, EI, failed runs and the
+/// difference are over the partners of the list, without the ordinary one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LeaderboardRow {
     /// Name of the helper.
@@ -44,6 +47,9 @@ pub struct LeaderboardRow {
     pub failed: usize,
     /// Difference of the transport rate to the reference of the table, paired by episode.
     pub difference: Option<RowDifference>,
+    /// Gains with the ordinary partner and with those of the list; absent for `none` and without a list.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub robustness: Option<HelperRobustness>,
 }
 
 /// Rates of a helper in a task.
@@ -105,11 +111,12 @@ impl LeaderboardRow {
         let results = HelperResults { results: &entry.results, helper };
         let MeanRate { mean: tr, interval, environments } =
             mean_rate(results, &entry.environments)?;
-        let scores = entry.score.tasks.iter();
+        let scores = entry.score.ranked_tasks().iter();
         let scores: Vec<(TaskId, &Score)> =
             scores.filter_map(|(task, row)| Some((*task, row.get(helper)?))).collect();
         let improvements: Vec<f64> = scores.iter().filter_map(|(_, score)| score.ei).collect();
         let n = improvements.len() as f64;
+        let mut robustness = entry.score.partners.iter().flat_map(|partners| &partners.robustness);
         Some(LeaderboardRow {
             name: helper.to_owned(),
             title: title(helper),
@@ -132,6 +139,7 @@ impl LeaderboardRow {
                 })
                 .collect(),
             difference: None,
+            robustness: robustness.find(|row| row.helper == helper).cloned(),
         })
     }
 }
@@ -139,7 +147,8 @@ impl LeaderboardRow {
 /// First line of the comma-separated values.
 pub(super) const CSV_HEADER: &str = "table,chaic,split,track,rules,partner,helper,release,sha256,license,\
     core_hours,grants,perception,tr,tr_low,tr_high,ei,failed,reference,difference,difference_low,\
-    difference_high,p,p_holm\n";
+    difference_high,p,p_holm,partners,partners_sha256,ordinary_gain,gain,gain_low,gain_high,share_kept,\
+    share_kept_low,share_kept_high,worst_partner,worst_partner_gain,worst_tenth,worst_tenth_ordinary\n";
 
 /// Returns the line of a row in the comma-separated values. `number` is the number of its table.
 pub(super) fn csv_line(number: usize, table: &LeaderboardTable, row: &LeaderboardRow) -> String {
@@ -148,13 +157,22 @@ pub(super) fn csv_line(number: usize, table: &LeaderboardTable, row: &Leaderboar
     let granted = row.granted.as_ref();
     let difference =
         |value: fn(&RowDifference) -> f64| decimals(row.difference.as_ref().map(value));
+    let robustness = row.robustness.as_ref();
+    let estimate = |value: fn(&HelperRobustness) -> Option<&Estimate>| robustness.and_then(value);
+    let mean = |value: Option<&Estimate>| decimals(value.map(|estimate| estimate.mean));
+    let end = |value: Option<&Estimate>, end: fn(&Interval) -> f64| {
+        decimals(value.and_then(|estimate| estimate.interval.as_ref()).map(end))
+    };
+    let gain = estimate(|row| Some(&row.suite));
+    let share_kept = estimate(|row| row.share_kept.as_ref());
+    let worst = robustness.and_then(HelperRobustness::worst_partner);
     let cells = [
         number.to_string(),
         rules.chaic.clone(),
         rules.split.clone(),
         rules.track.clone(),
         rules.rules.clone(),
-        rules.partner.clone(),
+        rules.ranked_partners(),
         row.name.clone(),
         row.release.clone(),
         row.sha256.clone().unwrap_or_default(),
@@ -173,6 +191,19 @@ pub(super) fn csv_line(number: usize, table: &LeaderboardTable, row: &Leaderboar
         difference(|d| d.high),
         difference(|d| d.p),
         difference(|d| d.p_holm),
+        rules.partners.as_ref().map_or(String::new(), |partners| partners.n.to_string()),
+        rules.partners.as_ref().map_or(String::new(), |partners| partners.sha256.clone()),
+        mean(estimate(|row| Some(&row.ordinary.gain))),
+        mean(gain),
+        end(gain, |interval| interval.low),
+        end(gain, |interval| interval.high),
+        mean(share_kept),
+        end(share_kept, |interval| interval.low),
+        end(share_kept, |interval| interval.high),
+        worst.map_or(String::new(), |worst| worst.partner.clone()),
+        decimals(worst.map(|worst| worst.gain.mean)),
+        mean(estimate(|row| Some(&row.worst_decile))),
+        mean(estimate(|row| Some(&row.worst_decile_ordinary))),
     ];
     cells.map(|cell| csv_text(&cell)).join(",") + "\n"
 }

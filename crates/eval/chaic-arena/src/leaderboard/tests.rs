@@ -1,11 +1,18 @@
-//! Promises: rows of different rules are never in one table, and texts of a submission cannot add markup.
+//! Promises: rows of different rules or partners are never in one table, a table with a list of partners ranks by the
+//! list, and texts of a submission cannot add markup.
 
 use chaic_core::TaskId;
-use chaic_eval::metrics::{FormulaSet, PlayedEpisodes, RunStatus, Scores, Summary};
+use chaic_core::capability::PersonChange;
+use chaic_env::partner_suite::SuitePartner;
+use chaic_eval::metrics::{
+    FormulaSet, PartnerResults, PlayedEpisodes, RunStatus, Scores, Summary, robustness,
+};
 use chaic_eval::report::RecordedGrants;
 
 use super::*;
-use crate::score::SubmissionRecord;
+use crate::partners::PartnersDigest;
+use crate::played::pooled;
+use crate::score::{EpisodeOutcome, PartnerScore, PartnersScore, SubmissionRecord};
 
 const EVIL: &str = "</td><script>alert(1)</script>\"'&";
 
@@ -22,6 +29,7 @@ fn rules(split: &str, track: &str) -> EvaluationConditions {
         seeds: 1,
         size: None,
         partner: "rules".to_owned(),
+        partners: None,
         person: None,
         appearance: "canonical".to_owned(),
         perception: "gt".to_owned(),
@@ -47,6 +55,79 @@ fn result(helper: &str, k: usize, done: u32) -> RunResult {
     RunResult { key, status: RunStatus::Done(summary) }
 }
 
+/// Returns the record of a result in a score.
+fn record(result: &RunResult) -> EpisodeRunRecord {
+    let outcome = result.summary().map(|summary| EpisodeOutcome {
+        frames: summary.frames,
+        done: summary.done,
+        total: summary.total,
+        state: summary.digest,
+        trace_sha256: String::new(),
+    });
+    EpisodeRunRecord { key: result.key.clone(), outcome }
+}
+
+fn tasks(results: &[RunResult]) -> BTreeMap<TaskId, BTreeMap<String, chaic_eval::metrics::Score>> {
+    let environments = Environments::default();
+    let played = PlayedEpisodes { results, planned: &[], environments: &environments };
+    Scores::new(played, &FormulaSet::Paper.formulas()).tasks
+}
+
+/// Returns results with a person, in tenths per episode: `rates` of the helper, 1 of no helper and 4 of RHP.
+fn partner_results(person: &str, name: &str, rates: [u32; 6]) -> Vec<RunResult> {
+    let own = rates.iter().enumerate().map(|(k, done)| result(name, k, *done));
+    let others = [(NONE, 1), ("rhp", 4)];
+    let others = others.iter().flat_map(|(name, done)| (0..6).map(move |k| result(name, k, *done)));
+    let renamed = own.chain(others).map(|mut result| {
+        result.key.episode += &format!("/{person}");
+        result
+    });
+    renamed.collect()
+}
+
+/// Adds results with the persons `+tires` and `+tremor` to an evaluation, in tenths per episode. The
+/// list has this digest.
+fn with_partners(
+    entry: ConfirmedEntry,
+    digest: &str,
+    tires: [u32; 6],
+    tremor: [u32; 6],
+) -> ConfirmedEntry {
+    let name = entry.score.submission.name.clone();
+    let persons: [(PersonChange, Vec<RunResult>); 2] = [("+tires", tires), ("+tremor", tremor)]
+        .map(|(person, rates)| {
+            (person.parse().expect("a change"), partner_results(person, &name, rates))
+        });
+    let ordinary = PartnerResults { partner: RULES, person: None, results: &entry.results };
+    let others = persons.iter().map(|(person, results)| PartnerResults {
+        partner: if person.to_string() == "+tires" { "tires" } else { "trembles" },
+        person: Some(*person),
+        results,
+    });
+    let played: Vec<PartnerResults<'_>> = std::iter::once(ordinary).chain(others).collect();
+    let list = played[1..].iter().map(|partner| PartnerScore {
+        partner: SuitePartner {
+            name: partner.partner.to_owned(),
+            partner: None,
+            person: partner.person,
+        },
+        grants: None,
+        tr: BTreeMap::new(),
+        episode_runs: partner.results.iter().map(record).collect(),
+    });
+    let results = pooled(persons.iter().map(|(person, results)| (Some(*person), &results[..])));
+    let partners = PartnersScore {
+        tasks: tasks(&results),
+        robustness: robustness(&played, &[name], &entry.environments),
+        list: list.collect(),
+    };
+    let digest = PartnersDigest { n: 2, sha256: digest.to_owned() };
+    let conditions =
+        EvaluationConditions { partners: Some(digest), ..entry.score.conditions.clone() };
+    let score = SubmissionScore { conditions, partners: Some(partners), ..entry.score.clone() };
+    ConfirmedEntry { score, results, ..entry }
+}
+
 /// Returns an evaluation in which the helper delivers `rates` tenths per episode, and RHP 4 and 5.
 fn entry(name: &str, conditions: &EvaluationConditions, rates: [u32; 6]) -> ConfirmedEntry {
     let own = rates.iter().enumerate().map(|(k, done)| result(name, k, *done));
@@ -60,10 +141,7 @@ fn entry(name: &str, conditions: &EvaluationConditions, rates: [u32; 6]) -> Conf
         isolation: None,
         weights: None,
     };
-    let planned: Vec<RunKey> = results.iter().map(|result| result.key.clone()).collect();
     let environments = Environments::default();
-    let played =
-        PlayedEpisodes { results: &results, planned: &planned, environments: &environments };
     let score = SubmissionScore {
         format: "chaic-score",
         version: 1,
@@ -80,8 +158,9 @@ fn entry(name: &str, conditions: &EvaluationConditions, rates: [u32; 6]) -> Conf
         conditions: conditions.clone(),
         grants: [name, NONE, "rhp"].map(|name| (name.to_owned(), granted.clone())).into(),
         partner: None,
-        tasks: Scores::new(played, &FormulaSet::Paper.formulas()).tasks,
-        episode_runs: Vec::new(),
+        tasks: tasks(&results),
+        episode_runs: results.iter().map(record).collect(),
+        partners: None,
     };
     ConfirmedEntry { folder: format!("of-{name}"), score, results, environments }
 }
@@ -115,6 +194,76 @@ fn rows_of_different_rules_are_in_different_tables() {
     let page = board.to_html("t");
     assert_eq!(page.matches("<table>").count(), 3 * 7);
     assert_eq!(page.matches("<caption>").count(), 3 * 7);
+}
+
+#[test]
+fn a_table_with_partners_ranks_by_the_list_and_shows_robustness() {
+    let unrestricted = rules("a", "unrestricted");
+    let entry = |name: &str, rates| entry(name, &unrestricted, rates);
+    let board = leaderboard(vec![
+        // Better with the ordinary partner, worse with the list.
+        with_partners(entry("tuned", [9; 6]), "x", [2, 2, 2, 2, 2, 2], [1, 3, 2, 1, 3, 2]),
+        with_partners(entry("robust", [5; 6]), "x", [4, 4, 6, 6, 5, 5], [5, 5, 5, 5, 5, 5]),
+        with_partners(entry("other", [8; 6]), "y", [8; 6], [8; 6]),
+        entry("plain", [7; 6]),
+    ]);
+    assert!(board.refused.is_empty(), "{:?}", board.refused);
+    let names = |table: &LeaderboardTable| -> Vec<String> {
+        let submissions = table.rows.iter().filter(|row| row.sha256.is_some());
+        submissions.map(|row| row.name.clone()).collect()
+    };
+    let [plain, x, y] = &board.tables[..] else { panic!("three tables") };
+    assert_eq!([names(plain), names(y)], [["plain"], ["other"]]);
+    assert_eq!(names(x), ["robust", "tuned"]);
+    let row = |name: &str| x.rows.iter().find(|row| row.name == name).expect(name);
+    let (robust, tuned) = (row("robust"), row("tuned"));
+    assert!((robust.tr - 0.5).abs() < 1e-12 && (tuned.tr - 0.2).abs() < 1e-12, "{x:?}");
+    let obstacle = &robust.tasks[&TaskId::Obstacle];
+    assert!((obstacle.tr - 0.5).abs() < 1e-12, "{obstacle:?}");
+    // Differences to RHP: 0.05, 0.05, 0.15, 0.15, 0.1, 0.1.
+    let difference = robust.difference.expect("paired with RHP");
+    assert!((difference.mean - 0.1).abs() < 1e-12 && difference.low > 0.0, "{difference:?}");
+    // Gains: 0.35 on average with the ordinary partner, 0.4 with the list.
+    let gains = robust.robustness.as_ref().expect("it played the list");
+    assert!((gains.ordinary.gain.mean - 0.35).abs() < 1e-12, "{gains:?}");
+    assert!((gains.suite.mean - 0.4).abs() < 1e-12, "{gains:?}");
+    assert!(plain.rows.iter().all(|row| row.robustness.is_none()));
+
+    let page = board.to_html("t");
+    for words in ["Share kept", "list of 2", "a, unrestricted track, 2 partners", "Worst tenth:"] {
+        assert!(page.contains(words), "{words}: {page}");
+    }
+    assert_eq!(page.matches(": robustness, gain of TR").count(), 2);
+    let csv = board.to_csv();
+    let header: Vec<&str> = csv.lines().next().expect("a header").split(',').collect();
+    let line = csv.lines().find(|line| line.contains(",robust,")).expect("its row");
+    let cells: Vec<&str> = line.split(',').collect();
+    assert_eq!(cells.len(), header.len());
+    let cell = |name: &str| cells[header.iter().position(|n| *n == name).expect(name)];
+    assert_eq!((cell("partners"), cell("gain")), ("2", "0.400000"));
+    assert_eq!(cell("partner"), "list of 2");
+
+    // A table without a list has the words and fields of earlier versions only.
+    let plain = leaderboard(vec![entry("plain", [7; 6])]);
+    for text in [plain.to_html("t"), plain.to_json()] {
+        assert!(!text.contains("robustness") && !text.contains("Share kept"), "{text}");
+    }
+}
+
+#[test]
+fn a_built_in_helper_that_plays_otherwise_with_one_partner_is_found() {
+    let unrestricted = rules("a", "unrestricted");
+    let first = with_partners(entry("first", &unrestricted, [5; 6]), "x", [5; 6], [5; 6]);
+    let mut cheater = with_partners(entry("cheater", &unrestricted, [5; 6]), "x", [9; 6], [9; 6]);
+    let partners = cheater.score.partners.as_mut().expect("a list");
+    let runs = &mut partners.list[1].episode_runs;
+    let of_none = runs.iter_mut().find(|run| run.key.helper == NONE).expect("it played");
+    of_none.outcome.as_mut().expect("it ended").state = chaic_env::Digest(99);
+    let board = leaderboard(vec![first, cheater]);
+    let [refused] = &board.refused[..] else { panic!("{:?}", board.refused) };
+    let expected =
+        "obstacle/sealed/000/+tremor with none, partner trembles and seed 0 ends otherwise";
+    assert!(refused.reason.starts_with(expected), "{}", refused.reason);
 }
 
 #[test]
@@ -160,8 +309,8 @@ fn one_environment_is_counted_although_it_has_no_interval() {
 fn repeated_and_contradictory_evaluations_are_refused() {
     let unrestricted = rules("a", "unrestricted");
     let mut cheater = entry("cheater", &unrestricted, [9; 6]);
-    let of_none = cheater.results.iter_mut().find(|result| result.key.helper == NONE);
-    *of_none.expect("it played") = result(NONE, 0, 0);
+    let of_none = cheater.score.episode_runs.iter_mut().find(|run| run.key.helper == NONE);
+    *of_none.expect("it played") = record(&result(NONE, 0, 0));
     let board = leaderboard(vec![
         entry("first", &unrestricted, [5; 6]),
         entry("first", &unrestricted, [5; 6]),

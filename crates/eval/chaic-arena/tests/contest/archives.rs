@@ -6,6 +6,7 @@ use std::path::Path;
 use chaic_arena::archive::{content_sha256, extract, pack};
 use chaic_arena::{ArenaError, Evaluation, Submission};
 use chaic_eval::EvalError;
+use chaic_files::FolderLock;
 
 use crate::raw_tar::{MANIFEST, archive, file, folder, gzip, with_manifest};
 
@@ -35,6 +36,9 @@ fn equal_content_gives_equal_archives_and_comes_back() {
     assert_eq!((packed.n_files, packed.bytes), (3, 512 * 10));
     assert_eq!(content_sha256(&at.join("a")).expect("the folder"), packed.sha256);
 
+    // A killed process leaves a part.
+    fs::create_dir_all(at.join("new/c.tmp/helper")).expect("the disk has space");
+    fs::write(at.join("new/c.tmp/helper/half"), "half").expect("the disk has space");
     extract(&at.join("a.tar"), &at.join("new/c")).expect("it was packed here");
     assert_eq!(content_sha256(&at.join("new/c")).expect("the folder"), packed.sha256);
     let data = fs::read(at.join("new/c/helper/lib/data.bin")).expect("the file");
@@ -63,12 +67,10 @@ fn only_the_permission_to_execute_is_kept() {
     set("lib/data.bin", 0o600);
     pack(&at.join("a"), &at.join("a.tar")).expect("a plain folder");
     extract(&at.join("a.tar"), &at.join("b")).expect("it was packed here");
-    let mode = |name: &str| {
-        let metadata = fs::metadata(at.join("b/helper").join(name)).expect("the file");
-        metadata.permissions().mode() & 0o7711
-    };
-    assert_eq!((mode("helper.sh"), mode("lib/data.bin")), (0o711, 0o600));
-    assert_eq!(fs::metadata(at.join("b")).expect("it").permissions().mode() & 0o7777, 0o755);
+    let mode = |path: &str| fs::metadata(at.join(path)).expect("it exists").permissions().mode();
+    let modes = ["b/helper/helper.sh", "b/helper/lib/data.bin"].map(|path| mode(path) & 0o7711);
+    assert_eq!(modes, [0o711, 0o600]);
+    assert_eq!(mode("b"), mode("a"), "as any new folder");
 }
 
 #[cfg(unix)]
@@ -124,6 +126,11 @@ fn an_evaluation_keeps_its_submission() {
         fs::write(at.join(name), with_manifest(manifest)).expect("the disk has space");
     }
     let evaluation = Evaluation::at(&at.join("result"));
+    fs::create_dir(at.join("result")).expect("the disk has space");
+    let lock = FolderLock::acquire(&at.join("result")).expect("no process holds it");
+    let error = evaluation.add_submission(&at.join("one.tar")).expect_err("it is locked");
+    assert!(error.to_string().contains("result is in use by another process"), "{error}");
+    drop(lock);
     let first = evaluation.add_submission(&at.join("one.tar")).expect("a submission");
     let again = evaluation.add_submission(&at.join("one.tar")).expect("the same submission");
     assert_eq!(first.sha256(), again.sha256());

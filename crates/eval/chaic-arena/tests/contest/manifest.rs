@@ -66,6 +66,7 @@ fn each_problem_is_named_with_its_place() {
         ("version = 1", "version = 1\nextra = 1", "unknown field `extra`"),
         ("\"mine\"", "\"../mine\"", "`name`: `../mine` is not a valid name"),
         ("\"mine\"", "\"none\"", "`name`: there is a helper `none` already"),
+        ("\"mine\"", "\"a\\nb\"", "`name` has a line break"),
         ("\"1.0\"", "1.0", "`release`: invalid type: floating point `1.0`"),
         ("\"1.0\"", "\"=1+1\"", "`release` has other characters"),
         ("[\"A. Author\", \"B. Author\"]", "[]", "`authors` has 0 entries"),
@@ -73,11 +74,13 @@ fn each_problem_is_named_with_its_place() {
         ("MIT OR Apache-2.0", "MIT OR MINE", "`license` is no SPDX expression"),
         ("MIT OR Apache-2.0", "", "`license` has 0 bytes"),
         ("0.1.0", "0.0.9", "`chaic` is 0.0.9, but this is chaic 0.1.0"),
+        ("0.1.0", "0.1\\n2", "`chaic` has a line break"),
         ("[helper]", "[helper]\npolicy = \"w\"", "`helper`: give exactly one of"),
         ("command = ", "run = ", "unknown field `run`"),
         ("[\"python3\", \"helper.py\"]", "\"python3 helper.py\"", "`helper.command`: invalid type"),
         ("[\"python3\", \"helper.py\"]", "[]", "`helper.command` has 0 words"),
         ("\"ids\"", "\"gold\"", "`play.grants`: no grant `gold`"),
+        ("\"ids\"", "\"a\\r\\u001b[2J\"", "`play.grants`: no grant `a  [2J`"),
         ("\"ids\"", "\"goal_place\"", "`goal_place` is listed twice"),
         ("[play]", "[play]\ntrack = \"open\"", "`play.track`: unknown variant `open`"),
         ("[play]", "[play]\ntrack = \"hidden\"", "`play`: helper `mine` is granted ids"),
@@ -94,8 +97,11 @@ fn each_problem_is_named_with_its_place() {
         assert!(GOOD.contains(from), "{from}");
         let error = parse(&GOOD.replacen(from, to, 1)).expect_err(to).to_string();
         assert!(error.starts_with("submission.toml: ") && error.contains(words), "{to}: {error}");
-        assert!(!error.contains('\n'), "{error}");
+        assert!(!error.contains(char::is_control), "{error}");
     }
+    let long = GOOD.replacen("ids", &"x".repeat(5000), 1);
+    let error = parse(&long).expect_err("no such grant").to_string();
+    assert!(error.contains("`play.grants`: no grant `xxx") && error.len() < 600, "{error}");
     for policy in ["/w", "../w", "a/../../w", "", "a\\\\b"] {
         let to = format!("policy = \"{policy}\"");
         let error = parse(&GOOD.replace(r#"command = ["python3", "helper.py"]"#, &to));

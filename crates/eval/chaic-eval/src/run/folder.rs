@@ -251,8 +251,8 @@ impl RunFolder {
             let other = granted.isolation.get(name).filter(|other| *other != isolation);
             if let Some(other) = other {
                 return Err(EvalError::Options(format!(
-                    "{name} runs as `{other}` now, but {} has `{isolation}`; give --exec-trust as before, \
-                     or start a new run",
+                    "{name} runs as `{other}` now, but {} has `{isolation}`; use the same system and \
+                     options, or start a new run",
                     path.display()
                 )));
             }

@@ -1,15 +1,16 @@
 //! Checks of a folder with several partners, beside the checks of its runs.
 
+use chaic_core::observation::Grants;
 use chaic_files::{entries, read_bounded};
 
 use super::{PartnerRun, REPORT, Robustness, SuiteFolder};
 use crate::error::Result;
-use crate::run::{PARTNERS_FILE, RunOptions};
+use crate::run::{PARTNERS_FILE, RunFolder, RunGrants, RunOptions};
 use crate::verify::Finding;
 
 impl SuiteFolder {
-    /// Returns the problems of the folder: runs whose options differ in more than the partner, other
-    /// entries, and a report that differs from the results.
+    /// Returns the problems of the folder: runs whose options or recorded grants differ in more than
+    /// the partner, other entries, and a report that differs from the results.
     ///
     /// # Errors
     /// If a file can't be read.
@@ -23,6 +24,7 @@ impl SuiteFolder {
             add(PARTNERS_FILE, "its form differs from what chaic writes".to_owned());
         }
         let ordinary = runs.first().map(|run| &run.options);
+        let ordinary_grants = runs.first().map(|run| helper_grants(&run.folder)).transpose()?;
         for run in runs {
             let expected = ordinary.map(|options| RunOptions {
                 partner: run.partner.partner.clone(),
@@ -31,6 +33,11 @@ impl SuiteFolder {
             });
             if expected.as_ref() != Some(&run.options) {
                 let problem = "its options are not those of the other runs with this partner";
+                add(&run.partner.name, problem.to_owned());
+            }
+            if ordinary_grants.as_ref() != Some(&helper_grants(&run.folder)?) {
+                let problem = "grants, perception, isolation or weights of its helpers are not those of \
+                               the other runs";
                 add(&run.partner.name, problem.to_owned());
             }
         }
@@ -45,7 +52,7 @@ impl SuiteFolder {
         }
         let (missing, altered) = self.differing_files(&Robustness::from_runs(runs))?;
         for name in missing {
-            add(name, "it is missing; write it with chaic eval --resume".to_owned());
+            add(name, "it is missing; repeat the command that played the runs".to_owned());
         }
         for name in altered {
             add(name, "it differs from the results".to_owned());
@@ -53,4 +60,9 @@ impl SuiteFolder {
         findings.sort();
         Ok(findings)
     }
+}
+
+/// Returns the recorded grants of a run without those of its partner.
+fn helper_grants(folder: &RunFolder) -> Result<Option<RunGrants>> {
+    Ok(folder.granted()?.map(|granted| RunGrants { partner: Grants::NONE, ..granted }))
 }

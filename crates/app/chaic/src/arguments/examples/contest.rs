@@ -38,7 +38,10 @@ pub(super) const EXAMPLES: &[CommandExamples] = &[
                 "Play rhp too, as the reference",
                 "chaic submit run mine.tar --rhp --episodes sealed/episodes --out results/mine",
             ),
-            ("Write the score afterwards", "chaic submit score results/mine"),
+            (
+                "Play with each partner of a list too",
+                "chaic submit run mine.tar --episodes episodes --partners partners.json --out results/mine",
+            ),
         ],
     ),
     (
@@ -55,7 +58,7 @@ pub(super) const EXAMPLES: &[CommandExamples] = &[
             ("Verify a score", "chaic submit verify results/mine"),
             ("Name the score itself", "chaic submit verify results/mine/score.json"),
             (
-                "Compare the episodes with the commitment too",
+                "Compare episodes and partners with the commitment too",
                 "chaic submit verify results/mine --commitment commitment.json",
             ),
         ],
@@ -65,7 +68,7 @@ pub(super) const EXAMPLES: &[CommandExamples] = &[
         [
             ("Write a page of all scores", "chaic leaderboard build results --out page.html"),
             (
-                "Accept runs on the committed episodes only",
+                "Refuse runs on other episodes or with another list of partners",
                 "chaic leaderboard build results --commitment commitment.json --out page.html",
             ),
             ("Verify one score", "chaic submit verify results/mine"),

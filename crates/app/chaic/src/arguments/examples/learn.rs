@@ -178,8 +178,8 @@ pub(super) const EXAMPLES: &[CommandExamples] = &[
                 "chaic export episodes --split gen:0..100 --task shopping --out data/shopping",
             ),
             (
-                "Export the training episodes",
-                "chaic export episodes --split train --out data/train",
+                "Export the episodes of an opened contest",
+                "chaic export episodes --episodes opened --out data/contest",
             ),
         ],
     ),

@@ -1,7 +1,10 @@
 //! Promise: a run that was stopped at its start can be started again, and files of others are not
 //! removed.
 
+use chaic_env::partner_suite::PartnerSuite;
+
 use super::*;
+use crate::suite::SuiteFolder;
 
 /// Files that a run of one episode file writes before its `run.json`, besides the lock.
 const STARTUP_FILES: [&str; 7] = [
@@ -41,6 +44,37 @@ fn a_run_that_was_stopped_at_its_start_is_started_again() {
         let access = if left % 2 == 0 { FolderMode::New } else { FolderMode::Resume };
         drop(Run::open(&path, access, &request, &helpers).unwrap());
         assert_eq!(names(&path), names(&undisturbed), "{left}");
+    }
+}
+
+#[test]
+fn runs_that_were_stopped_in_their_list_of_partners_are_started_again() {
+    let dir = tempfile::tempdir().unwrap();
+    let start = |path: &Path| SuiteFolder::start(path, PartnerSuite::bundled());
+    for (k, left) in [&["partners.json.tmp"][..], &["partners.json.tmp", "partners.json.1.tmp"]]
+        .into_iter()
+        .enumerate()
+    {
+        let path = dir.path().join(k.to_string());
+        fs::create_dir(&path).unwrap();
+        for name in left {
+            fs::write(path.join(name), "{ torn").unwrap();
+        }
+        start(&path).unwrap();
+        assert_eq!(SuiteFolder::read(&path).unwrap().suite(), &PartnerSuite::bundled());
+        assert!(!path.join("partners.json.tmp").exists());
+        // Until all runs are started, the same start continues.
+        start(&path).unwrap();
+    }
+    for other in ["partners.txt", "robustness.json.tmp"] {
+        let path = dir.path().join(other);
+        fs::create_dir(&path).unwrap();
+        fs::write(path.join("partners.json.tmp"), "{ torn").unwrap();
+        fs::write(path.join(other), "dear").unwrap();
+        let before = files_below(&path);
+        let error = start(&path).unwrap_err();
+        assert!(matches!(error, EvalError::NotEmpty { .. }), "{other}: {error}");
+        assert_eq!(files_below(&path), before);
     }
 }
 

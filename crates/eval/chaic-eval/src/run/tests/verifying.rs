@@ -5,9 +5,11 @@ use std::path::PathBuf;
 use chaic_core::AgentId;
 use chaic_env::Track;
 use chaic_env::helper_registry::BuiltInHelpers;
+use chaic_env::partner_suite::{PartnerSuite, SuitePartner};
 use chaic_env::trace::{Decision, Header, Participant, Record, Trace};
 
 use super::*;
+use crate::suite::{Robustness, SuiteFolder};
 
 /// Plays one short episode with the turner; returns the run, its trace and its folder.
 fn played_once(helpers: &TestHelpers) -> (Run, PathBuf, tempfile::TempDir) {
@@ -377,6 +379,49 @@ fn weights_perception_and_isolation_in_traces_are_those_of_the_run() {
                 problem.contains(expected) && problem.is_empty() == expected.is_empty();
             assert!(is_expected, "change {k}: {problem:?} instead of {expected:?}");
         }
+    }
+}
+
+#[test]
+fn helpers_are_the_same_with_all_partners_of_a_list() {
+    let agents = TrainedAgents("0123456789abcdef");
+    let (files, dir) = (episode_files(&[TaskId::LowTarget], 1), tempfile::tempdir().unwrap());
+    let person = Some("+speed150".parse().unwrap());
+    let fast = SuitePartner { name: "fast".to_owned(), partner: None, person };
+    let suite = PartnerSuite::new(vec![fast]).unwrap();
+    let folder = SuiteFolder::start(&dir.path().join("list"), suite).unwrap();
+    for entry in folder.partners() {
+        let helpers = ["none", "trained"];
+        let request = RunRequest { seeds: None, person: entry.person, ..request(&files, &helpers) };
+        let path = folder.run_path(&entry);
+        let (mut run, _) = Run::open(&path, FolderMode::New, &request, &agents).unwrap();
+        assert!(run.play(1, &agents, &AtomicBool::new(false), &mut |_| ()).unwrap());
+    }
+    folder.write_report(&Robustness::from_runs(&folder.runs().unwrap().0)).unwrap();
+    // Each run agrees with itself.
+    let findings = || {
+        let (runs, _) = folder.runs().unwrap();
+        for run in &runs {
+            let (part, options) = (&run.folder, &run.options);
+            let report = crate::verify::verify_run(part, options, &BuiltInHelpers, 1, &|_| ());
+            let report = report.unwrap();
+            assert_eq!((report.mismatches, report.findings), (vec![], vec![]));
+        }
+        folder.findings(&runs).unwrap()
+    };
+    assert_eq!(findings(), []);
+    let run = folder.path().join("fast");
+    let mut files = RunFolder::read(&run).unwrap().0.traces().unwrap();
+    files.push(run.join("run.json"));
+    let whole: Vec<String> = files.iter().map(|file| fs::read_to_string(file).unwrap()).collect();
+    for (from, to) in [("\"sandbox\"", "\"other\""), ("0123456789abcdef", "fedcba9876543210")] {
+        for (file, text) in files.iter().zip(&whole) {
+            fs::write(file, text.replace(from, to)).unwrap();
+        }
+        let found = findings();
+        let [finding] = &found[..] else { panic!("{from}: {found:?}") };
+        assert_eq!(finding.path, run);
+        assert!(finding.problem.contains("isolation or weights of its helpers"), "{finding}");
     }
 }
 

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use super::inputs::Inputs;
 
-/// Returns data sets of one indoor and one outdoor episode. Each line is a file, in the order of [`write`].
+/// Returns data sets of one indoor and one outdoor episode. Each line is a file, in the order of [`write()`].
 pub fn seeds() -> Vec<Vec<u8>> {
     let text = |files: [Value; 6]| files.map(|file| file.to_string()).join("\n");
     vec![text(house()).into_bytes(), text(street()).into_bytes()]

@@ -49,7 +49,7 @@ pub enum PerceptionError {
     /// The file holds the first stage of a detector, which is no perception of helpers.
     #[error(
         "{file}: the detector lacks its second stage; train it with `chaic train detection --weights \
-         {file} --set steps=0`",
+         {file} --set steps=0 --out DIR`",
         file = path.display()
     )]
     OneStage {

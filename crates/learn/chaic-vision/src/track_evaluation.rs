@@ -89,7 +89,7 @@ pub struct TrackReport {
     /// Fraction of the objects seen with enough pixels that are in memory at the end, by the smallest
     /// distance from which they were seen in meters.
     pub memory_recall_by_m: BTreeMap<u32, Rate>,
-    /// The same for all distances.
+    /// The same for all distances up to 10 m.
     pub memory_recall: Rate,
     /// Mean number of changes of the track of an object.
     pub identity_switches: Rate,

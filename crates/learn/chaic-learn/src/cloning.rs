@@ -1,8 +1,8 @@
 //! Behavior cloning of an expert, which also labels the states that the learner visits (DAgger, Ross
 //! et al. 2011).
 //!
-//! The expert has the observations, memory and grants of the learner. [`EXPERTS`] lists those that
-//! can be imitated.
+//! The expert has the observations, memory and grants of the learner, and the goal if
+//! [`ExpertInfo::knows_goal`] is true. [`EXPERTS`] lists those that can be imitated.
 
 use std::sync::PoisonError;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -22,7 +22,8 @@ use crate::opponent::network::OpponentInput;
 use crate::ppo::{Schedule, ppo_bounds, update};
 use crate::rollout::{RolloutEpisode, RolloutError};
 use crate::rollout_config::{
-    MAX_VALIDATION_EPISODES, REWARD, Validation, check_splits, read_opponent, validation_episodes,
+    MAX_VALIDATION_EPISODES, REWARD, Validation, check_splits, mean, read_opponent,
+    validation_episodes,
 };
 use crate::train::read_reference;
 
@@ -253,7 +254,7 @@ impl Trainer for VisualTrainer {
         let validation = Validation { perception: &**perception, baseline };
         let compared = validation.compare(&rates, &episodes, config.image_size, stop);
         let Some(mut named) = compared else { return Ok(None) };
-        named.insert("tr".to_owned(), rates.iter().sum::<f64>() / rates.len() as f64);
+        named.insert("tr".to_owned(), mean(&rates));
         Ok(Some((named, bytes)))
     }
 }

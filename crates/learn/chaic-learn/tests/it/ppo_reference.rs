@@ -219,7 +219,9 @@ fn advantages_of_decisions_of_any_duration_follow_from_their_td_errors() {
         let transitions: Vec<Transition<Vec<f32>>> = (0..40).map(|_| step()).collect();
         let trajectory = Trajectory { transitions, bootstrap_value: 0.7 };
         let expected = reference_advantages(&config, &trajectory);
-        for (found, expected) in compute_gae(&config, &trajectory).into_iter().zip(expected) {
+        let found = compute_gae(&config, &trajectory);
+        assert_eq!(found.len(), expected.len());
+        for (found, expected) in found.into_iter().zip(expected) {
             let error = (f64::from(found) - expected).abs();
             assert!(error < 1e-4, "gamma {gamma}, lambda {gae_lambda}: {found} is not {expected}");
         }

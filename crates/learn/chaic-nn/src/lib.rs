@@ -36,6 +36,6 @@ mod tests;
 pub use adam::{AdamW, AdamWConfig};
 pub use conv::Kernel;
 pub use inference::Inference;
-pub use network::{Network, Node, Parameter};
+pub use network::{Network, Node, Parameter, normal};
 pub use pass::Pass;
 pub use tensor::{Shape, Tensor, TensorView};

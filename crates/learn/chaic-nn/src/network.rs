@@ -315,6 +315,6 @@ impl Network {
 
 /// Draws an approximately normal number: the sum of twelve uniform draws minus 6. It needs no
 /// logarithm, which machines round differently.
-fn normal(rng: &mut RngStream) -> f32 {
+pub fn normal(rng: &mut RngStream) -> f32 {
     (0..12).map(|_| rng.unit()).sum::<f32>() - 6.0
 }

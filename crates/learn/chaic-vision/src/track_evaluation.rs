@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use chaic_agents::behavior::{BehaviorLog, BehaviorModel};
 use chaic_agents::helpers::rhp;
 use chaic_agents::memory::Memory;
-use chaic_agents::perception::{GroundTruthIds, Perception, Percepts};
+use chaic_agents::perception::{Detection, GroundTruthIds, Perception, Percepts};
 use chaic_agents::perception_factory::PerceptionFactory;
 use chaic_agents::track::{Hands, Intent, TrackId};
 use chaic_core::geom::horizontal_distance;
@@ -93,6 +93,11 @@ pub struct TrackReport {
     pub memory_recall: Rate,
     /// Mean number of changes of the track of an object.
     pub identity_switches: Rate,
+    /// Fraction of detected people that are visible within 0.5 m of their detected position.
+    pub person_precision: Rate,
+    /// Fraction of people of [`MIN_AREA_PX`] pixels and more that are detected within 0.5 m of their
+    /// position.
+    pub person_recall: Rate,
     /// Expected calibration error of the confidences of detections.
     pub calibration_error: f64,
     /// Counts by class name.
@@ -206,6 +211,39 @@ struct TrueObject {
     n_switches: usize,
 }
 
+/// Counts of visible and of detected people in images.
+#[derive(Clone, Copy, Debug, Default)]
+struct PersonCounts {
+    detected: usize,
+    /// Detected near their true position.
+    correct: usize,
+    /// Visible with enough pixels.
+    visible: usize,
+    /// Visible with enough pixels and detected near their true position.
+    found: usize,
+}
+
+impl PersonCounts {
+    /// Adds one image.
+    fn add(&mut self, detections: &[Detection], truths: &[Detection]) {
+        let is_near = |a: &Detection, b: &Detection| {
+            let distance_m = horizontal_distance(a.position_in_world, b.position_in_world);
+            a.person == b.person && distance_m < MAX_ERROR_M
+        };
+        let people = |detections: &[Detection]| -> Vec<Detection> {
+            detections.iter().filter(|d| d.person.is_some()).cloned().collect()
+        };
+        let (detected, truths) = (people(detections), people(truths));
+        self.detected += detected.len();
+        self.correct += detected.iter().filter(|d| truths.iter().any(|t| is_near(d, t))).count();
+        let visible = truths.iter().filter(|t| t.n_pixels >= MIN_AREA_PX);
+        for truth in visible {
+            self.visible += 1;
+            self.found += usize::from(detected.iter().any(|d| is_near(d, truth)));
+        }
+    }
+}
+
 /// Counts of one episode.
 #[derive(Clone, Debug, Default)]
 struct EpisodeRecord {
@@ -215,6 +253,7 @@ struct EpisodeRecord {
     detections: Vec<(f32, bool)>,
     /// Distance of each visible object, and whether it is detected with its class.
     visible: Vec<(f32, bool)>,
+    people: PersonCounts,
     objects: BTreeMap<EntityId, TrueObject>,
     /// Objects that the helper has held: their ids, and their tracks.
     held: BTreeSet<EntityId>,
@@ -256,7 +295,9 @@ impl EpisodeRecord {
                 track_of.insert(entity, detection.track);
             }
         }
-        for truth in GroundTruthIds.perceive(observation).detections {
+        let truths = GroundTruthIds.perceive(observation).detections;
+        self.people.add(&percepts.detections, &truths);
+        for truth in truths {
             let entity = u16::try_from(truth.track.0).map(EntityId);
             let Ok(entity) = entity else { continue };
             if truth.person.is_some() || !self.is_evaluated(truth.class) {
@@ -387,6 +428,10 @@ impl TrackReport {
             memory_recall_by_m: by_m(&EpisodeRecord::memory_recall),
             memory_recall: Rate::new(records.iter().map(|r| r.memory_recall(all))),
             identity_switches: Rate::new(records.iter().map(switches)),
+            person_precision: Rate::new(
+                records.iter().map(|r| [r.people.correct, r.people.detected]),
+            ),
+            person_recall: Rate::new(records.iter().map(|r| [r.people.found, r.people.visible])),
             calibration_error: calibration_error(&scored),
             classes,
         }

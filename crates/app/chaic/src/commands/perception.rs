@@ -137,8 +137,12 @@ fn tracks_text(report: &TrackReport, perception: &str) -> String {
     }
     text + &format!(
         "identity switches per object {}\n\
+         precision of people         {}\n\
+         recall of visible people    {}\n\
          calibration error of confidences {:.3}\n",
         rate(&report.identity_switches),
+        rate(&report.person_precision),
+        rate(&report.person_recall),
         report.calibration_error
     )
 }

@@ -35,6 +35,8 @@ pub struct ClipAugmentation {
     pub is_mirrored: bool,
     /// Translation to the right and down, pixels.
     pub shift: [i32; 2],
+    /// Addition to the depth relative to the person, meters.
+    pub depth_offset_m: f32,
     /// Factor of each color channel.
     pub gain: [f32; 3],
     /// Blanked crops: first index and count.
@@ -48,6 +50,7 @@ impl ClipAugmentation {
             first,
             is_mirrored: false,
             shift: [0; 2],
+            depth_offset_m: 0.0,
             gain: [1.0; 3],
             blanked: (0, 0),
         }
@@ -59,11 +62,13 @@ impl ClipAugmentation {
         let shift = [shift(), shift()];
         let brightness = rng.range(0.75, 1.25);
         let gain = [(); 3].map(|()| brightness * rng.range(0.85, 1.15));
+        let depth_offset_m = rng.range(-0.1, 0.1);
         let n_blanked = if rng.chance(0.25) { rng.below(CROPS / 4) } else { 0 };
         ClipAugmentation {
             first: rng.below(SLACK + 1),
             is_mirrored: rng.chance(0.5),
             shift,
+            depth_offset_m,
             gain,
             blanked: (rng.below(CROPS - n_blanked), n_blanked),
         }
@@ -116,7 +121,7 @@ fn fill_crop(
         if crop.depth[at] == 0 {
             continue;
         }
-        let behind_m = PersonCrop::behind_m(crop.depth[at]);
+        let behind_m = PersonCrop::behind_m(crop.depth[at]) + augmentation.depth_offset_m;
         let scale = STEP_M * (1.0 + behind_m / crop.distance_m);
         let lateral_m = (column as f32 + 0.5 - 0.5 * SIDE as f32) * scale;
         let above_m = (0.5 * SIDE as f32 - row as f32 - 0.5) * scale;
@@ -132,7 +137,7 @@ fn fill_crop(
         pixel[5] = if is_near { 1.0 } else { 0.0 };
         if previous.depth[at] != 0 {
             pixel[6] = (color(previous, 0) + color(previous, 1) + color(previous, 2)) / 3.0;
-            pixel[7] = PersonCrop::behind_m(previous.depth[at]);
+            pixel[7] = PersonCrop::behind_m(previous.depth[at]) + augmentation.depth_offset_m;
         }
     }
 }

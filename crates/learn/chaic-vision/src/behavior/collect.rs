@@ -11,21 +11,24 @@ use chaic_agents::perception_factory::PerceptionFactory;
 use chaic_agents::policies::FollowPolicy;
 use chaic_core::observation::{FrameHistorySpec, Grants};
 use chaic_core::rng::RngStream;
-use chaic_core::{Action, AgentError, AgentId, Frame, Observation, TaskId};
+use chaic_core::{Action, AgentError, AgentId, Frame, Observation, TaskId, Vec3};
 use chaic_env::helper_registry::Helper;
 use chaic_env::rules::{RuleSet, RuleSetName};
 use chaic_env::trace::Record;
 use chaic_env::{AdvanceOutcome, Appearance, Env, EpisodeConfig, seeded_by_episode};
 use chaic_episodes::{SeedRange, find_episode};
+use chaic_nn::normal;
 use chaic_world::EventKind;
 
 use super::Behavior;
 use super::clip::{CROPS, Clip, SLACK};
 use super::config::ClipCollectionConfig;
-use super::crop::{HISTORY, PersonCrop, PersonCropper};
+use super::crop::{HISTORY, PersonCrop, PersonCropper, visible_position};
 use super::store::{ClipFolder, StoreError};
+use crate::noisy::{DetectorNoiseModel, NoisyPerceptionFactory};
 use crate::parallel::map_in_order;
 use crate::perception::LearnedPerceptionFactory;
+use crate::perception_registry::NOISY;
 use crate::trained::TrainedDetector;
 use crate::views::DatasetSplit;
 
@@ -63,8 +66,8 @@ pub struct Collector<'a> {
     pub split: DatasetSplit,
     /// Configuration.
     pub config: &'a ClipCollectionConfig,
-    /// Perception of the recording helpers, except for [`ClipCollectionConfig::learned_fraction`]
-    /// of them.
+    /// Perception of the recording helpers, except for the fractions with learned and noisy perception
+    /// of the configuration.
     pub perception: &'a dyn PerceptionFactory,
     /// Number of parallel episodes; does not affect the clips.
     pub n_threads: usize,
@@ -86,14 +89,18 @@ pub fn collect(
     let (mut clips, mut counts): (Vec<Clip>, Counts) = Default::default();
     let learned_perception = (config.learned_fraction > 0.0)
         .then(|| LearnedPerceptionFactory::new(TrainedDetector::built_in()));
-    let perception_for = |index: usize| match &learned_perception {
-        Some(learned_perception)
-            if RngStream::new(config.seed, "film", index as u64)
-                .chance(config.learned_fraction) =>
-        {
-            learned_perception
+    let noisy_perception =
+        NoisyPerceptionFactory::new(DetectorNoiseModel::built_in(), NOISY.to_owned());
+    // The perception of an episode, and whether the person's positions are noisy.
+    let perception_for = |index: usize| -> (&dyn PerceptionFactory, bool) {
+        let drawn = RngStream::new(config.seed, "film", index as u64).unit();
+        match &learned_perception {
+            Some(learned) if drawn < config.learned_fraction => (learned, false),
+            _ if drawn < config.learned_fraction + config.noisy_fraction => {
+                (&noisy_perception, true)
+            }
+            _ => (perception, false),
         }
-        _ => perception,
     };
     for first in (0..config.episodes).step_by(EPISODES_PER_ROUND) {
         if counts.iter().all(|n| *n >= config.max_per_class) {
@@ -131,11 +138,12 @@ pub fn collect(
 fn episode_clips(
     split: DatasetSplit,
     config: &ClipCollectionConfig,
-    perception: &dyn PerceptionFactory,
+    (perception, is_noisy): (&dyn PerceptionFactory, bool),
     index: u64,
     stop: &AtomicBool,
 ) -> Vec<Clip> {
     let mut rng = RngStream::new(config.seed, "behavior", index);
+    let position_noise = is_noisy.then(|| RngStream::new(config.seed, "positions", index));
     let tasks: Vec<TaskId> =
         TASKS.into_iter().flat_map(|(task, n)| std::iter::repeat_n(task, n)).collect();
     let task = tasks[rng.below(tasks.len())];
@@ -150,7 +158,7 @@ fn episode_clips(
     let rule_set = RuleSet::named(RuleSetName::Paper);
     let config =
         EpisodeConfig { rules: rule_set, appearance, ..EpisodeConfig::new(&episode, "follow") };
-    let recorder = Recorder::default();
+    let recorder = Recorder { position_noise, ..Recorder::default() };
     let crops = Arc::clone(&recorder.crops);
     let agent = PlanningAgent::with(
         FollowPolicy::default(),
@@ -175,26 +183,26 @@ fn episode_clips(
 }
 
 /// Behavior model that records crops of the partner.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct Recorder {
     cropper: PersonCropper,
     crops: Arc<Mutex<Vec<PersonCrop>>>,
+    position_noise: Option<RngStream>,
     log: BehaviorLog,
 }
 
-impl Default for Recorder {
-    fn default() -> Recorder {
-        Recorder {
-            cropper: PersonCropper::new(AgentId::PARTNER),
-            crops: Arc::default(),
-            log: BehaviorLog::default(),
-        }
-    }
+/// Returns a position with a random error like those of the bundled detector: the median of their
+/// horizontal distance is 0.015 m, the 90 % quantile 0.074 m and the 99 % quantile 0.167 m (689
+/// detections in 8 episodes of `chaic eval tracks`); of these it is 0.018, 0.081 and 0.151 m.
+fn with_noise(at: Vec3, rng: &mut RngStream) -> Vec3 {
+    let std_dev_m = if rng.chance(0.75) { 0.012 } else { 0.06 };
+    let mut error_m = || std_dev_m * normal(rng);
+    Vec3::new(at.x + error_m(), at.y, at.z + error_m())
 }
 
 impl BehaviorModel for Recorder {
     fn reset(&mut self) {
-        self.cropper = PersonCropper::new(AgentId::PARTNER);
+        self.cropper = PersonCropper::default();
     }
 
     fn frame_history(&self) -> Option<FrameHistorySpec> {
@@ -202,7 +210,11 @@ impl BehaviorModel for Recorder {
     }
 
     fn observe(&mut self, observation: &Observation, memory: &Memory) {
-        let crops = self.cropper.crop(observation, memory);
+        let mut at = visible_position(memory, AgentId::PARTNER);
+        if let Some(rng) = &mut self.position_noise {
+            at = at.map(|at| with_noise(at, rng));
+        }
+        let crops = self.cropper.crop(observation.frame, &observation.frame_history, at);
         self.crops.lock().unwrap_or_else(PoisonError::into_inner).extend(crops);
     }
 

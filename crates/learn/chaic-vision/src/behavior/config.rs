@@ -20,6 +20,9 @@ pub struct ClipCollectionConfig {
     /// realistic localization errors.
     #[serde(alias = "learned")]
     pub learned_fraction: f32,
+    /// Fraction of episodes recorded by helpers with the error rates of the bundled detector and noisy
+    /// positions of the partner. They take a twentieth of the time.
+    pub noisy_fraction: f32,
 }
 
 impl Default for ClipCollectionConfig {
@@ -30,7 +33,24 @@ impl Default for ClipCollectionConfig {
             episodes: 1000,
             varied_fraction: 0.35,
             learned_fraction: 0.0,
+            noisy_fraction: 0.0,
         }
+    }
+}
+
+impl ClipCollectionConfig {
+    /// Checks that the fractions of perceptions do not exceed the whole.
+    ///
+    /// # Errors
+    /// One line that names the keys.
+    pub fn check(&self) -> Result<(), String> {
+        let sum = self.learned_fraction + self.noisy_fraction;
+        if sum > 1.0 {
+            return Err(format!(
+                "collect.learned_fraction plus collect.noisy_fraction is {sum}; it must be at most 1"
+            ));
+        }
+        Ok(())
     }
 }
 
@@ -41,6 +61,7 @@ pub const COLLECT_BOUNDS: BoundTable = &[
     ("episodes", integer(1, MAX_EPISODES as i64)),
     ("varied_fraction", FRACTION),
     ("learned_fraction", FRACTION),
+    ("noisy_fraction", FRACTION),
 ];
 /// Maximum number of clips of each behavior, and of mixed clips. A clip takes 0.33 MB, which makes
 /// 12 GB.

@@ -71,7 +71,7 @@ pub struct TrainedBehavior {
 }
 
 /// Kind in weights files.
-const KIND: &str = "chaic behavior 1";
+const KIND: &str = "chaic behavior 2";
 
 /// Returns the network together with the temperature of the file.
 fn file_layout(network: &BehaviorNetwork) -> Network {

@@ -18,7 +18,7 @@ use chaic_nn::Pass;
 
 use super::Behavior;
 use super::clip::{CROPS, SLACK};
-use super::crop::{HISTORY, PersonCrop, PersonCropper};
+use super::crop::{HISTORY, PersonCrop, PersonCropper, visible_position};
 use super::network::TrainedBehavior;
 use super::report::most_probable;
 
@@ -120,7 +120,7 @@ impl LearnedBehavior {
             model,
             config: RecognizerConfig::default(),
             person,
-            cropper: PersonCropper::new(person),
+            cropper: PersonCropper::default(),
             crops: VecDeque::new(),
             n_new: 0,
             inferred: InferredBehavior::new(person),
@@ -246,7 +246,9 @@ impl BehaviorModel for LearnedBehavior {
 
     fn observe(&mut self, observation: &Observation, memory: &Memory) {
         self.inferred.observe(observation, memory);
-        for crop in self.cropper.crop(observation, memory) {
+        let at = visible_position(memory, self.person);
+        let images = &observation.frame_history;
+        for crop in self.cropper.crop(observation.frame, images, at) {
             let Some((behavior, frame)) = self.push(crop) else { continue };
             self.last = Some((behavior, frame));
             if let Some((action, outcome)) = self.ground(behavior, memory) {

@@ -5,9 +5,9 @@ use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use chaic_agents::perception_factory::GroundTruthPerceptionFactory;
-use chaic_core::Vec3;
 use chaic_core::geom::{Camera, yaw_rotation};
 use chaic_core::observation::{HistoryFrame, Images};
+use chaic_core::{Frame, Vec3};
 use chaic_training::conformance::{bounds_every_number, refuses_damaged_checkpoints};
 use chaic_training::{Checkpoint, Trainer as _, parse_config};
 
@@ -15,7 +15,7 @@ use super::Behavior;
 use super::clip::{CROPS, Clip, SLACK};
 use super::collect::{Collector, Counts, collect};
 use super::config::ClipCollectionConfig;
-use super::crop::{HISTORY, PersonCrop, SIDE};
+use super::crop::{HISTORY, PersonCrop, PersonCropper, SIDE};
 use super::network::{TrainedBehavior, softmax};
 use super::report::{all_outputs, calibrate, report};
 use super::store::ClipFolder;
@@ -61,11 +61,35 @@ fn a_crop_has_the_same_scale_at_any_distance() {
     assert!(behind.is_blank(), "a person behind the camera is not visible");
 }
 
+#[test]
+fn crops_ignore_small_displacements_and_bridge_images_without_the_person() {
+    let mut cropper = PersonCropper::default();
+    let mut crop = |now: Frame, distance_m: Option<f32>| {
+        let image = HistoryFrame { frame: now, ..history_frame(3.0) };
+        let at = distance_m.map(|distance_m| Vec3::new(0.0, 0.9, -distance_m));
+        let [crop] = &cropper.crop(now, &[image], at)[..] else { panic!("one crop per image") };
+        (crop.distance_m, crop.speed)
+    };
+    let is_close = |(distance_m, speed): (f32, f32), expected: [f32; 2]| {
+        (distance_m - expected[0]).abs() < 1e-4 && (speed - expected[1]).abs() < 1e-4
+    };
+    assert!(is_close(crop(0, Some(3.0)), [3.0, 0.0]));
+    for (now, distance_m) in [(3, Some(3.08)), (6, Some(2.93)), (9, None)] {
+        assert!(is_close(crop(now, distance_m), [3.0, 0.0]), "at frame {now}");
+    }
+    // The last sighting was at frame 6. The crop follows all but 0.1 m of a longer displacement.
+    assert!(is_close(crop(12, Some(3.7)), [3.6, 0.1]));
+    assert!(is_close(crop(15, None), [3.6, 0.1]));
+    assert!(crop(12 + 45, None).0 == 0.0, "an old sighting determines no crop");
+    assert!(is_close(crop(60, Some(2.0)), [2.0, 0.0]));
+}
+
 fn small_collection() -> ClipCollectionConfig {
     ClipCollectionConfig {
         max_per_class: 4,
         episodes: 3,
         varied_fraction: 0.0,
+        noisy_fraction: 0.4,
         ..ClipCollectionConfig::default()
     }
 }
@@ -204,5 +228,8 @@ fn damaged_checkpoints_and_values_out_of_bounds_are_refused() {
     refuses_damaged_checkpoints(&mut trainer);
     bounds_every_number::<BehaviorTrainer>();
     assert!(parse_config::<BehaviorTrainer>("shards = 256\nclips = 60").is_err());
+    let fractions = "[collect]\nlearned_fraction = 0.6\nnoisy_fraction = 0.5";
+    let refused = parse_config::<BehaviorTrainer>(fractions).unwrap_err().to_string();
+    assert!(refused.contains("noisy_fraction"), "{refused}");
     assert!(trainer.validate(&AtomicBool::new(true)).unwrap().is_none());
 }

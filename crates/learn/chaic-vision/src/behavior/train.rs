@@ -246,7 +246,7 @@ impl Trainer for BehaviorTrainer {
                 "shards times batch_size is {batch}; it must be from 1 to {MAX_BATCH_CLIPS}"
             ));
         }
-        Ok(())
+        config.collect.check()
     }
 
     fn read_weights(_: &BehaviorTrainingConfig, weights: &[u8]) -> Result<Vec<f32>, WeightsError> {

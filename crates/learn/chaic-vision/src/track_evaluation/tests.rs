@@ -1,6 +1,8 @@
 //! Promises: perfect detections are tracked and remembered; errors lower the scores; the nearest
 //! pairs of one class match.
 
+use chaic_agents::perception::SegmentMeasurement;
+
 use super::*;
 use crate::noisy::{DetectorNoiseModel, NoisyPerceptionFactory};
 
@@ -18,6 +20,7 @@ fn perfect_detections_are_remembered_and_errors_lower_the_scores() {
     assert!(perfect.detection_recall.value > 0.95, "{perfect:?}");
     assert!(perfect.memory_recall.value > 0.9, "{perfect:?}");
     // Nearly all objects are first detected within 10 m.
+    assert!(perfect.person_precision.value > 0.99 && perfect.person_recall.value > 0.99);
     let n = perfect.memory_precision.n;
     let in_range: usize = perfect.memory_precision_by_m.values().map(|rate| rate.n).sum();
     assert!(in_range <= n && 10 * in_range >= 9 * n && n > 0, "{perfect:?}");
@@ -39,6 +42,29 @@ fn an_episode_that_broke_down_is_a_failure() {
     assert_eq!(failure.episode, "obstacle/gen-standard/1");
     assert!(failure.problem.contains("no image"), "{failure:?}");
     assert!(result(Ok(AdvanceOutcome::Stopped)).is_err());
+}
+
+#[test]
+fn a_person_far_from_its_detection_is_not_found() {
+    let person = |agent: u8, x: f32, n_pixels: u32| {
+        let extent = SegmentMeasurement {
+            pixel: [0; 2],
+            position_in_world: Vec3::new(x, 1.0, 0.0),
+            bottom_m: 0.0,
+            top_m: 1.7,
+            n_pixels,
+            footprint: Vec::new(),
+        };
+        let agent = AgentId(agent);
+        let track = EntityId::from_agent(agent).into();
+        Detection::new(track, ClassId::named("person"), Some(agent), extent)
+    };
+    let mut counts = PersonCounts::default();
+    let truths = [person(1, 0.0, 500), person(2, 5.0, MIN_AREA_PX - 1)];
+    counts.add(&[person(1, 0.4, 450)], &truths);
+    counts.add(&[person(1, 0.6, 450), person(2, 5.0, 90)], &truths);
+    assert_eq!((counts.detected, counts.correct), (3, 2));
+    assert_eq!((counts.visible, counts.found), (2, 1));
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use chaic_core::rng::RngStream;
 
 use super::Behavior;
-use super::crop::{CENTER_HEIGHT_M, PersonCrop, SIDE, WINDOW_M};
+use super::crop::{CENTER_HEIGHT_M, PersonCrop, SIDE, SLACK_M, WINDOW_M};
 
 /// Crops that the network reads: 96 frames, 3.2 seconds.
 pub const CROPS: usize = 32;
@@ -62,7 +62,7 @@ impl ClipAugmentation {
         let shift = [shift(), shift()];
         let brightness = rng.range(0.75, 1.25);
         let gain = [(); 3].map(|()| brightness * rng.range(0.85, 1.15));
-        let depth_offset_m = rng.range(-0.1, 0.1);
+        let depth_offset_m = rng.range(-SLACK_M, SLACK_M);
         let n_blanked = if rng.chance(0.25) { rng.below(CROPS / 4) } else { 0 };
         ClipAugmentation {
             first: rng.below(SLACK + 1),

@@ -18,11 +18,11 @@ pub const HISTORY: FrameHistorySpec =
 const MIN_DISTANCE_M: f32 = 0.5;
 /// Quantization step of stored depth relative to the person, meters.
 const DEPTH_STEP_M: f32 = 0.0125;
-/// Maximum age of a sighting that determines crops, frames.
+/// Maximum age of a sighting that determines crops, frames: 1.5 s (ours).
 const MAX_AGE_FRAMES: Frame = 45;
-/// Displacement that crops ignore, meters. Positions are means over masks: they vary with the mask (90 %
-/// of errors of the bundled detector are below 0.07 m) and with the arms.
-const SLACK_M: f32 = 0.1;
+/// Displacement that crops ignore, meters. Positions are means over masks, which vary from image to
+/// image and with the arms. Nearly all errors of the bundled detector are smaller.
+pub const SLACK_M: f32 = 0.1;
 
 /// Crop of a person.
 #[derive(Clone, Debug, PartialEq)]

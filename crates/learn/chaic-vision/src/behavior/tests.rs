@@ -7,13 +7,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use chaic_agents::perception_factory::GroundTruthPerceptionFactory;
 use chaic_core::geom::{Camera, yaw_rotation};
 use chaic_core::observation::{HistoryFrame, Images};
+use chaic_core::rng::RngStream;
 use chaic_core::{Frame, Vec3};
 use chaic_training::conformance::{bounds_every_number, refuses_damaged_checkpoints};
 use chaic_training::{Checkpoint, Trainer as _, parse_config};
 
 use super::Behavior;
 use super::clip::{CROPS, Clip, SLACK};
-use super::collect::{Collector, Counts, collect};
+use super::collect::{Collector, Counts, collect, with_noise};
 use super::config::ClipCollectionConfig;
 use super::crop::{HISTORY, PersonCrop, PersonCropper, SIDE};
 use super::network::{TrainedBehavior, softmax};
@@ -84,12 +85,24 @@ fn crops_ignore_small_displacements_and_bridge_images_without_the_person() {
     assert!(is_close(crop(60, Some(2.0)), [2.0, 0.0]));
 }
 
+#[test]
+fn position_noise_has_the_documented_quantiles() {
+    let mut rng = RngStream::new(1, "noise", 0);
+    let error_m = |_| with_noise(Vec3::ZERO, &mut rng).length();
+    let mut errors: Vec<f32> = (0..10_000).map(error_m).collect();
+    errors.sort_by(f32::total_cmp);
+    for (rank, expected) in [(5_000, 0.018), (9_000, 0.081), (9_900, 0.151)] {
+        let error = errors[rank];
+        assert!((error / expected - 1.0).abs() < 0.1, "{error} at rank {rank}, not {expected}");
+    }
+}
+
 fn small_collection() -> ClipCollectionConfig {
     ClipCollectionConfig {
         max_per_class: 4,
         episodes: 3,
         varied_fraction: 0.0,
-        noisy_fraction: 0.4,
+        noisy_fraction: 0.8,
         ..ClipCollectionConfig::default()
     }
 }
@@ -101,19 +114,22 @@ fn clips_are_contiguous_show_the_person_and_do_not_depend_on_threads() {
     let folder =
         ClipFolder::open(dir.path(), DatasetSplit::Train, &config, &GroundTruthPerceptionFactory)
             .unwrap();
-    let clips = |n_threads, folder| {
+    let clips_of = |config: &ClipCollectionConfig, n_threads, folder| {
         let collector = Collector {
             split: DatasetSplit::Train,
-            config: &config,
+            config,
             perception: &GroundTruthPerceptionFactory,
             n_threads,
             folder,
         };
         collect(&collector, &mut |_, _| (), &NEVER_STOP).unwrap().unwrap()
     };
+    let clips = |n_threads, folder| clips_of(&config, n_threads, folder);
     let one = clips(1, None);
     assert!(one == clips(2, Some(&folder)), "clips differ between one thread and two");
     assert!(one == clips(2, Some(&folder)), "clips differ when they are read again");
+    let exact = ClipCollectionConfig { noisy_fraction: 0.0, ..config };
+    assert!(one != clips_of(&exact, 2, None), "no episode is noisy");
     // A flag that is set during the first round leaves no files.
     let (other_dir, stop) = (tempfile::tempdir().unwrap(), AtomicBool::new(false));
     let folder = ClipFolder::open(

@@ -1,5 +1,5 @@
 //! Promises: perfect detections are tracked and remembered; errors lower the scores; the nearest
-//! pairs of one class match.
+//! pairs of one class match; people are found near their position only.
 
 use chaic_agents::perception::SegmentMeasurement;
 
@@ -19,8 +19,8 @@ fn perfect_detections_are_remembered_and_errors_lower_the_scores() {
     assert!(perfect.detection_precision.value > 0.99, "{perfect:?}");
     assert!(perfect.detection_recall.value > 0.95, "{perfect:?}");
     assert!(perfect.memory_recall.value > 0.9, "{perfect:?}");
-    // Nearly all objects are first detected within 10 m.
     assert!(perfect.person_precision.value > 0.99 && perfect.person_recall.value > 0.99);
+    // Nearly all objects are first detected within 10 m.
     let n = perfect.memory_precision.n;
     let in_range: usize = perfect.memory_precision_by_m.values().map(|rate| rate.n).sum();
     assert!(in_range <= n && 10 * in_range >= 9 * n && n > 0, "{perfect:?}");

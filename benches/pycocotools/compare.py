@@ -45,7 +45,8 @@ def main(folder: str, report_path: str) -> int:
     precision = evaluation.eval["precision"][:, :, :, :, 0]
 
     def mean(values):
-        return float(np.mean(values[values > -1])) if (values > -1).any() else 0.0
+        """The mean, or None if no class has instances, as in chaic's report."""
+        return float(np.mean(values[values > -1])) if (values > -1).any() else None
 
     names = {c["id"]: c["name"] for c in truth.dataset["categories"]}
     rows = []
@@ -69,6 +70,11 @@ def main(folder: str, report_path: str) -> int:
     worst = 0.0
     print(f"{'':32} {'pycocotools':>11} {'chaic':>8}")
     for name, theirs, ours in rows:
+        if theirs is None or ours is None:
+            if theirs is not ours:
+                print(f"{name}: undefined in only one of the two")
+                return 1
+            continue
         worst = max(worst, abs(theirs - ours))
         print(f"{name:32} {theirs:11.6f} {ours:8.6f}")
     print(f"largest difference {worst:.1e}")

@@ -107,8 +107,9 @@ def evaluate(
     one episode after the other. The helper must be defined at the top level of a file, so that the process can import it.
     Without isolation a helper has all rights of this process, and the run records it as ``trusted``.
 
-    ``KeyboardInterrupt`` stops the run; ``resume=True`` continues it. ``first`` and ``beside`` are deprecated names of
-    ``n_episodes`` and ``baselines``.
+    ``KeyboardInterrupt`` stops the run; ``resume=True`` continues it with the same helpers. Other options may then be
+    omitted, and given ones must be those of the run. ``first`` and ``beside`` are deprecated names of ``n_episodes`` and
+    ``baselines``.
     """
     if jobs is not None and jobs < 1:
         raise ValueError(f"jobs is {jobs}, expected at least 1")
@@ -130,8 +131,6 @@ def evaluate(
         raise ValueError("give a helper or baselines")
     if options.get("episodes") is not None:
         options["episodes"] = os.fspath(options["episodes"])
-    elif split is None:
-        split = "test"
     options |= {"split": split, "seeds": seeds}
     if tasks is not None:
         options["tasks"] = task_names(tasks)

@@ -49,6 +49,16 @@ class Rhp:
         return self.agent.act(observation)
 
 
+def write_short_episode(episode, folder, horizon):
+    """Writes an episode with another time limit to a new folder, and returns the folder."""
+    fields = episode.as_dict()
+    del fields["generator"]
+    fields["setup"]["horizon"] = horizon
+    folder.mkdir()
+    (folder / "short.json").write_text(chaic.Episode.from_dict(fields).to_json())
+    return folder
+
+
 def test_a_python_helper_is_scored_and_verified(tmp_path):
     run = chaic.evaluate(Turner, baselines=["none"], out=tmp_path / "run", **OPTIONS)
     records = run.records()
@@ -216,6 +226,31 @@ def test_an_interrupted_run_can_be_resumed(tmp_path):
     assert len(run.results()) == 1
 
 
+def test_a_resumed_run_has_the_options_of_its_start(tmp_path):
+    class Interrupts(Turner):
+        def act(self, observation):
+            raise KeyboardInterrupt
+
+    start = {"out": tmp_path / "run", "quiet": True}
+    with pytest.raises(KeyboardInterrupt):
+        chaic.evaluate({"turner": Interrupts}, tasks="low_target", split="train", n_episodes=1, **start)
+    with pytest.raises(ValueError, match="--split"):
+        chaic.evaluate(Turner, split="test", resume=True, **start)
+    run = chaic.evaluate(Turner, resume=True, **start)
+    assert run.options["split"] == "train" and len(run.results()) == 1
+
+
+def test_a_resumed_run_has_the_perception_of_its_start(tmp_path, episode):
+    folder = write_short_episode(episode, tmp_path / "episodes", horizon=60)
+    start = {"baselines": "rhp", "out": tmp_path / "run", "quiet": True}
+    chaic.evaluate(episodes=folder, perception="learned", **start)
+    run = chaic.evaluate(resume=True, **start)
+    assert run.options["perception"] == "learned" and not run.records()["failed"].any()
+    for option, name in [("perception", "gt"), ("behavior", "learned")]:
+        with pytest.raises(ValueError, match=f"--{option}"):
+            chaic.evaluate(resume=True, **{option: name}, **start)
+
+
 def test_invalid_arguments_are_refused(tmp_path):
     out = tmp_path / "run"
     for kind, call in [
@@ -257,12 +292,7 @@ def test_a_page_to_play_has_the_named_episodes(tmp_path):
 
 
 def test_a_folder_of_episodes_is_a_path_or_a_string(tmp_path, episode):
-    fields = episode.as_dict()
-    del fields["generator"]
-    fields["setup"]["horizon"] = 100
-    folder = tmp_path / "episodes"
-    folder.mkdir()
-    (folder / "short.json").write_text(chaic.Episode.from_dict(fields).to_json())
+    folder = write_short_episode(episode, tmp_path / "episodes", horizon=100)
     for name, episodes in [("path", folder), ("string", str(folder))]:
         run = chaic.evaluate(Turner, episodes=episodes, out=tmp_path / name, quiet=True)
         assert run.records()["frames"].tolist() == [100]

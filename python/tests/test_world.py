@@ -291,6 +291,13 @@ def test_batch_arrays_have_the_shape_of_the_images(episode):
     for arrays in wrong:
         with pytest.raises(ValueError):
             batch.observe(**arrays)
+    fortran = np.zeros((1, 16, 16), np.float32, order="F")
+    for call in (batch.observe, batch.advance_and_observe):
+        with pytest.raises(ValueError, match="C-contiguous"):
+            call(depth=fortran)
+        with pytest.raises(ValueError, match="C-contiguous"):
+            call(depth=depth.transpose(0, 2, 1))
+    assert not fortran.any() and depth.any()
 
 
 def test_read_only_arrays_and_shared_memory_raise_errors(episode):

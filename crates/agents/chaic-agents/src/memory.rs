@@ -178,7 +178,7 @@ impl Memory {
             self.people.iter().filter(|p| p.is_in_view).map(|p| p.position_in_world).collect();
         let people_at = if self.rules.sees_held_objects { &in_view[..] } else { &[] };
         self.objects.update(detections, people_at, self.rules.seen_held_ignore_frames, self.frame);
-        if self.rules.forgets_missing {
+        if self.rules.forgets_missing && !percepts.is_reused {
             self.objects.forget_missing(observation);
         }
         self.objects.count_newly_available(before, self.frame);

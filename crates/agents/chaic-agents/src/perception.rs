@@ -73,6 +73,9 @@ pub struct Percepts {
     /// Objects in the agent's hands, if perception knows them; otherwise the memory infers them
     /// from the agent's actions.
     pub hands: Option<Hands>,
+    /// True if the image was not searched for objects, and the detections are those of an earlier
+    /// image. A missing detection then means nothing.
+    pub is_reused: bool,
 }
 
 /// Turns images into detections.
@@ -215,7 +218,7 @@ impl Perception for GroundTruthIds {
             Some(Detection::new(entity.into(), class, entity.agent(), measurement?))
         };
         let detections = measurements.into_iter().enumerate().filter_map(detection).collect();
-        Percepts { detections, dynamic_mask, stride: STRIDE, hands }
+        Percepts { detections, dynamic_mask, stride: STRIDE, hands, is_reused: false }
     }
 
     fn target(&self, track: TrackId) -> Option<Target> {

@@ -67,8 +67,8 @@ struct Episode {
     held: Vec<TrackId>,
     /// The last action, as intent and as sent to the world.
     sent: Option<(Intent, Action)>,
-    /// Consecutive turns made to get the target object into view.
-    n_search_turns: u32,
+    /// Object that the agent turns to in order to get it into view, and the number of these turns.
+    search: Option<(TrackId, u32)>,
 }
 
 impl<P: Policy> PlanningAgent<P> {
@@ -182,7 +182,7 @@ impl Episode {
             change_count: 0,
             held: Vec::new(),
             sent: None,
-            n_search_turns: 0,
+            search: None,
         }
     }
 
@@ -238,18 +238,19 @@ impl Episode {
         let target = |track| perception.target(track);
         if let Some(action) = resolve_target(intent, target) {
             if !action.is_locomotion() {
-                self.n_search_turns = 0;
+                self.search = None;
             }
             return Some((intent, action));
         }
         let track = intent.subject()?;
-        self.n_search_turns += 1;
+        let n_turns = 1 + self.search.filter(|(of, _)| *of == track).map_or(0, |(_, n)| n);
+        self.search = Some((track, n_turns));
         let at = self.memory.objects.get(track).map(|t| t.nearest_point(self.memory.position()));
         let turn = at.and_then(|at| turn_towards(&self.memory, at, 0.0));
-        match turn.filter(|_| self.n_search_turns <= MAX_SEARCH_TURNS) {
+        match turn.filter(|_| n_turns <= MAX_SEARCH_TURNS) {
             Some(turn) => resolve_target(turn, target).map(|action| (turn, action)),
             None => {
-                self.n_search_turns = 0;
+                self.search = None;
                 let until = self.memory.frame + self.memory.rules.failures.ignore_frames;
                 self.memory.objects.ignore(track, until);
                 None

@@ -86,6 +86,12 @@ pub enum EnvError {
         /// Known names.
         known: Vec<String>,
     },
+    /// The name of an additional helper is invalid or taken.
+    #[error("{problem}")]
+    HelperName {
+        /// Problem and a remedy, in one line.
+        problem: String,
+    },
     /// No partner has this name.
     #[error("unknown partner `{name}`; the partners are {known}", known = known.join(", "))]
     UnknownPartner {
@@ -172,7 +178,7 @@ impl EnvError {
     /// Returns whether the caller's arguments caused the error.
     pub fn is_usage(&self) -> bool {
         use EnvError::{
-            Batch, Buffer, InvalidPartner, PartnerFile, Partners, Rule, UnknownHelper,
+            Batch, Buffer, HelperName, InvalidPartner, PartnerFile, Partners, Rule, UnknownHelper,
             UnknownPartner, UnknownRule,
         };
         matches!(
@@ -180,6 +186,7 @@ impl EnvError {
             Batch(_)
                 | Buffer { .. }
                 | UnknownHelper { .. }
+                | HelperName { .. }
                 | UnknownPartner { .. }
                 | InvalidPartner { .. }
                 | PartnerFile { .. }

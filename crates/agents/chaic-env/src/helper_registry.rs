@@ -7,8 +7,8 @@ use std::sync::Arc;
 use chaic_agents::partners::{self, HabitsError, PARTNER_VARIANTS};
 use chaic_agents::perception_factory::{GroundTruthPerceptionFactory, PerceptionFactory};
 use chaic_agents::{HELPERS, HelperInfo, PlannerRules};
-use chaic_core::Agent;
 use chaic_core::observation::Grants;
+use chaic_core::{Agent, TaskId};
 
 use crate::digest::Digest;
 use crate::error::{EnvError, Result};
@@ -59,6 +59,14 @@ pub trait HelperRegistry: Sync {
     /// Returns the registry that this one extends; the default methods below delegate to it.
     fn fallback(&self) -> Option<&dyn HelperRegistry> {
         None
+    }
+
+    /// Checks that a helper can play a task.
+    ///
+    /// # Errors
+    /// One line with the reason, such as a file that is missing.
+    fn check_task(&self, name: &str, task: TaskId) -> std::result::Result<(), String> {
+        self.fallback().map_or(Ok(()), |registry| registry.check_task(name, task))
     }
 
     /// Receives the run folder before `run.json` is written and on every resume. Override it to keep

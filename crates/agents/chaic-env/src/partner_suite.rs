@@ -116,6 +116,10 @@ impl SuitePartner {
         }
         // The ordinary rules are no deviation.
         match partner.as_deref().filter(|name| *name != RULES).map(partner_habits) {
+            None if person.is_none() && partner.is_some() => Some(format!(
+                "`{name}` has the partner `{RULES}` and no `person`, so it is the ordinary partner, \
+                 which every run plays"
+            )),
             None if person.is_none() => Some(format!("`{name}` has no `partner` and no `person`")),
             Some(Err(HabitsError::Invalid(problem))) => Some(format!("`{name}`: {problem}")),
             _ => None,
@@ -249,7 +253,10 @@ mod tests {
             (entry(""), "0 partners, expected 1 to 100"),
             (entry(&many), "101 partners"),
             (entry(r#"{"name":"a"}"#), "`a` has no `partner` and no `person`"),
-            (entry(r#"{"name":"a","partner":"rules"}"#), "`a` has no `partner` and no `person`"),
+            (
+                entry(r#"{"name":"a","partner":"rules"}"#),
+                "`a` has the partner `rules` and no `person`, so it is the ordinary partner",
+            ),
             (entry(r#"{"name":"a/b","partner":"slow"}"#), "letters, digits"),
             (entry(r#"{"name":"","partner":"slow"}"#), "letters, digits"),
             (entry(r#"{"name":"rules","partner":"slow"}"#), "the ordinary partner"),

@@ -29,7 +29,7 @@ impl Confinement {
     /// Determines the paths that a command line can read and the parts that the system enforces.
     ///
     /// # Errors
-    /// [`Refusal`] if a path is missing or the launcher does not start.
+    /// [`Refusal`] if a path is missing or not UTF-8, or the launcher does not start.
     pub fn new(
         launcher: &Launcher,
         line: &str,
@@ -54,11 +54,13 @@ impl Confinement {
             max_tasks: limits.max_tasks,
         };
         if options.is_trusted {
+            check_names(&policy)?;
             let isolation = Isolation::Trusted;
             return Ok(Confinement { launcher: launcher.clone(), policy, isolation });
         }
         options.readable.iter().try_for_each(|p| policy.add_readable(p)).map_err(|e| refuse(&e))?;
         policy.add_from_command_line(line);
+        check_names(&policy)?;
         let isolation = launcher.probe(&policy).map_err(|e| refuse(&e))?;
         Ok(Confinement { launcher: launcher.clone(), policy, isolation })
     }
@@ -82,6 +84,18 @@ impl Confinement {
     /// Returns the process builder of a command line.
     pub(crate) fn command(&self, line: &str) -> std::process::Command {
         self.launcher.command(&self.policy, &self.isolation, line)
+    }
+}
+
+/// Refuses paths that are not UTF-8, since the request to the sandbox is JSON.
+fn check_names(policy: &Policy) -> Result<(), Refusal> {
+    let mut paths = policy.readable.iter().chain(&policy.masked).chain([&policy.start_folder]);
+    match paths.find(|path| path.to_str().is_none()) {
+        Some(path) => Err(Refusal(format!(
+            "{} is not UTF-8, so no helper process can be started; choose another name",
+            path.display()
+        ))),
+        None => Ok(()),
     }
 }
 
@@ -117,5 +131,19 @@ mod tests {
         std::os::unix::fs::symlink(top.join("real"), top.join("link")).unwrap();
         assert_eq!(resolve_links(&top.join("link/runs/new")), top.join("real/runs/new"));
         assert_eq!(resolve_links(&top.join("link")), top.join("real"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_path_that_is_not_utf8_is_refused() {
+        use std::os::unix::ffi::OsStrExt as _;
+        let name = PathBuf::from(std::ffi::OsStr::from_bytes(b"runs/\xff"));
+        let launcher = Launcher::new(["nowhere".into()]);
+        for is_trusted in [false, true] {
+            let masked = vec![name.clone()];
+            let options = ConfinementOptions { is_trusted, masked, ..Default::default() };
+            let refusal = Confinement::new(&launcher, "true", &Limits::default(), &options);
+            assert!(refusal.unwrap_err().0.contains("is not UTF-8"), "{is_trusted}");
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! Helper process with pipes, time limits and resource limits.
 
-use std::io::{Read, Write};
+use std::io::{ErrorKind, Read, Write};
 use std::process::{Child, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel, sync_channel};
@@ -24,6 +24,9 @@ use crate::program::HelperProgram;
 const POLL_PERIOD: Duration = Duration::from_millis(50);
 /// Time in which a process must exit after `bye` or a termination signal.
 const EXIT_TIMEOUT: Duration = Duration::from_secs(2);
+/// Problem of a process that closes its standard output within a message, as `echo hello` does.
+const INCOMPLETE: &str =
+    "sent an incomplete message; does the helper print to the standard output?";
 /// Length of the kept end of standard error, bytes.
 const STDERR_LEN: usize = 2000;
 
@@ -287,6 +290,7 @@ fn reader(mut stdout: impl Read + Send + 'static) -> Receiver<Result<MessageFram
             let read = match MessageFrame::read(&mut stdout, 0) {
                 Ok(Some(frame)) => Ok(frame),
                 Ok(None) => return,
+                Err(e) if e.kind() == ErrorKind::UnexpectedEof => Err(INCOMPLETE.to_owned()),
                 Err(e) => Err(format!("sent {e}")),
             };
             let is_last = read.is_err();

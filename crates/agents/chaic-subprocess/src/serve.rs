@@ -3,6 +3,7 @@
 use std::io::{self, Read, Write};
 
 use chaic_core::Agent;
+use chaic_core::observation::Grants;
 
 use crate::frame::{MAX_BODY, MessageFrame};
 use crate::message::{PROTOCOL, RequestMessage, ResponseMessage, message, observation, plain};
@@ -17,6 +18,21 @@ pub fn serve(
     input: &mut dyn Read,
     output: &mut dyn Write,
 ) -> io::Result<()> {
+    serve_with_grants(name, agent, Grants::NONE, input, output)
+}
+
+/// Serves an agent that needs grants, as [`serve`] does. A briefing without them is answered with
+/// `failed`.
+///
+/// # Errors
+/// As [`serve`].
+pub fn serve_with_grants(
+    name: &str,
+    agent: &mut dyn Agent,
+    needed: Grants,
+    input: &mut dyn Read,
+    output: &mut dyn Write,
+) -> io::Result<()> {
     let invalid = |text: String| io::Error::new(io::ErrorKind::InvalidData, text);
     while let Some(frame) = MessageFrame::read(input, MAX_BODY)? {
         let answer = match message(&frame).map_err(invalid)? {
@@ -24,8 +40,13 @@ pub fn serve(
                 ResponseMessage::Hello { protocol: PROTOCOL, name: name.to_owned() }
             }
             RequestMessage::Reset { briefing } => {
-                agent.reset(&briefing);
-                ResponseMessage::Ready { sensors: agent.sensors().into() }
+                let missing = needed.names_beyond(briefing.grants);
+                if missing.is_empty() {
+                    agent.reset(&briefing);
+                    ResponseMessage::Ready { sensors: agent.sensors().into() }
+                } else {
+                    ResponseMessage::Failed { problem: without_grants(needed, &missing) }
+                }
             }
             RequestMessage::Observe(request) => {
                 let observation = observation(*request, &frame.body).map_err(invalid)?;
@@ -39,4 +60,11 @@ pub fn serve(
         plain(&answer).write(output)?;
     }
     Ok(())
+}
+
+/// Returns the problem of a briefing without some of the needed grants.
+fn without_grants(needed: Grants, missing: &[&str]) -> String {
+    let needed = needed.names_beyond(Grants::NONE).join(",");
+    let missing = missing.join(",");
+    format!("the briefing lacks the grants {missing}; give --exec-grants {needed}")
 }

@@ -16,7 +16,7 @@ use chaic_env::{AdvanceOutcome, Env, EpisodeConfig};
 use chaic_episodes::find_episode;
 use chaic_subprocess::conformance::check;
 use chaic_subprocess::frame::MessageFrame;
-use chaic_subprocess::serve::serve;
+use chaic_subprocess::serve::{serve, serve_with_grants};
 use chaic_subprocess::{CommandRegistry, HelperProgram, Limits, Pool, SubprocessAgent};
 
 fn never_stop() -> &'static AtomicBool {
@@ -151,6 +151,28 @@ fn a_served_agent_acts_as_one_in_this_process() {
     }
 }
 
+#[test]
+fn a_served_agent_refuses_a_briefing_without_its_grants() {
+    use chaic_subprocess::message::{RequestMessage, ResponseMessage};
+    let answer = |granted: Grants| {
+        let mut helper = BuiltInHelpers.make("rhp", PlannerRules::paper()).unwrap();
+        let briefing = Briefing { grants: granted, ..briefing(TaskId::HighGoal) };
+        let reset = RequestMessage::Reset { briefing: Box::new(briefing) };
+        let frame = MessageFrame { head: serde_json::to_vec(&reset).unwrap(), body: Vec::new() };
+        let (mut input, mut output) = (Vec::new(), Vec::new());
+        frame.write(&mut input).unwrap();
+        let agent = helper.agent.as_mut();
+        serve_with_grants("rhp", agent, helper.grants, &mut &input[..], &mut output).unwrap();
+        let answer = MessageFrame::read(&mut &output[..], 0).unwrap().unwrap();
+        serde_json::from_slice::<ResponseMessage>(&answer.head).unwrap()
+    };
+    let problem = "the briefing lacks the grants goal_place; give --exec-grants ids,goal_place";
+    assert_eq!(answer(Grants::IDS), ResponseMessage::Failed { problem: problem.to_owned() });
+    for enough in [Grants::PLANNER, Grants::ORACLE] {
+        assert!(matches!(answer(enough), ResponseMessage::Ready { .. }), "{enough:?}");
+    }
+}
+
 /// Agent behind the protocol, served by a thread of this process.
 struct Piped {
     stream: UnixStream,
@@ -258,6 +280,7 @@ fn every_failure_of_a_process_is_reported() {
         ("no-such-command-at-all", "not found"),
         ("sleep 60", "no answer within 2 s"),
         ("echo Loading weights, please wait", "standard output"),
+        ("echo hello", "sent an incomplete message; does the helper print to the standard output?"),
         ("cat", "no message of the protocol"),
     ] {
         let text = short(line);

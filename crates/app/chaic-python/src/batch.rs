@@ -97,8 +97,13 @@ fn check_shape(
 fn slice_of<'a, T: Element>(
     array: &'a mut Option<PyReadwriteArrayDyn<'_, T>>,
 ) -> PyResult<Option<&'a mut [T]>> {
-    let slice = array.as_mut().map(|a| a.as_slice_mut()).transpose();
-    slice.map_err(|_| mistake("an image array is not C-contiguous"))
+    let Some(array) = array else { return Ok(None) };
+    let wrong = || mistake("an image array is not C-contiguous");
+    // A slice of an array in Fortran order has the elements in another order.
+    if !array.is_c_contiguous() {
+        return Err(wrong());
+    }
+    array.as_slice_mut().map(Some).map_err(|_| wrong())
 }
 
 fn outcome_codes(

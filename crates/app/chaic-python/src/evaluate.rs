@@ -8,7 +8,7 @@ use std::thread;
 use std::time::Duration;
 
 use chaic_agents::PlannerRules;
-use chaic_agents::perception_factory::GROUND_TRUTH;
+use chaic_agents::perception_factory::{GROUND_TRUTH, PerceptionFactory};
 use chaic_core::observation::{Grants, SensorConfig};
 use chaic_core::{Action, Agent, AgentError};
 use chaic_env::helper_registry::{BuiltInWithPerception, Helper, HelperRegistry, check_new_name};
@@ -16,7 +16,7 @@ use chaic_env::{CHAIC_VERSION, RunKey, Track};
 use chaic_eval::EvalError;
 use chaic_eval::metrics::FormulaSet;
 use chaic_eval::report::{Format, Report, write_files};
-use chaic_eval::run::{FolderMode, JobEvent, Run, RunRequest, Shard};
+use chaic_eval::run::{FolderMode, JobEvent, Run, RunFolder, RunOptions, RunRequest, Shard};
 use chaic_learn::helpers::PolicyRegistry;
 use chaic_sandbox::Isolation;
 use pyo3::exceptions::{PyTypeError, PyUserWarning};
@@ -145,12 +145,25 @@ impl Keywords {
             rules: self.rules.map(|name| name.parse().map_err(mistake)).transpose()?,
             rule_overrides: self.set.into_vec(),
             no_traces: self.traces == Some(false),
-            perception: self.perception.filter(|name| name != GROUND_TRUTH),
-            behavior: self.behavior.filter(|name| name != GROUND_TRUTH),
+            perception: self.perception,
+            behavior: self.behavior,
             track,
             ..RunRequest::default()
         })
     }
+}
+
+/// Returns the object detection and behavior recognition of a run: as given, or as recorded in a run that is resumed.
+fn run_perception(
+    keywords: &Keywords,
+    recorded: Option<&RunOptions>,
+) -> PyResult<Arc<dyn PerceptionFactory>> {
+    let recorded_perception = recorded.and_then(|options| options.perception.as_deref());
+    let recorded_behavior = recorded.and_then(|options| options.behavior.as_deref());
+    perception(
+        keywords.perception.as_deref().or(recorded_perception).unwrap_or(GROUND_TRUTH),
+        keywords.behavior.as_deref().or(recorded_behavior).unwrap_or(GROUND_TRUTH),
+    )
 }
 
 /// Writes report and figures into the folder of a complete run; returns the report as a table.
@@ -215,14 +228,15 @@ pub fn evaluate(
     refuse_fork()?;
     let wrong = |error: pythonize::PythonizeError| PyTypeError::new_err(error.to_string());
     let mut keywords: Keywords = depythonize(options).map_err(wrong)?;
-    let track = keywords.track()?.unwrap_or_default();
+    // `Run::open` reports a damaged record.
+    let recorded = if resume { RunFolder::read(&out).ok() } else { None };
+    let recorded: Option<RunOptions> = recorded.map(|(_, options)| options);
+    // A resumed run has recorded the perception that its track requires.
+    let track = keywords.track()?.filter(|_| recorded.is_none()).unwrap_or_default();
     keywords.perception = track.perception_or(keywords.perception);
     keywords.behavior = track.perception_or(keywords.behavior);
     let names: Vec<String> = helpers.iter().map(|(name, _)| name.clone()).collect();
-    let or_ground_truth =
-        |name: &Option<String>| name.clone().unwrap_or_else(|| GROUND_TRUTH.to_owned());
-    let perception =
-        perception(&or_ground_truth(&keywords.perception), &or_ground_truth(&keywords.behavior))?;
+    let perception = run_perception(&keywords, recorded.as_ref())?;
     let with_perception = BuiltInWithPerception { perception: Arc::clone(&perception) };
     let built_in = PolicyRegistry::bundled(&with_perception, perception);
     let makers: Vec<_> =

@@ -3,11 +3,12 @@
 //! Each append is one write, which is synchronized (`fdatasync`) before the request is answered.
 
 use std::fs;
-use std::io::{self, Write as _};
+use std::io::{self, ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
 use chaic_files::{
-    EntryKind, FileError, kind, open_for_append, read_bounded, remove_file, write_new_private,
+    EntryKind, FileError, kind, open_existing_for_append, read_bounded, remove_file,
+    write_new_private,
 };
 use chaic_study::data::{DataRecord, TrialEnd};
 use chaic_study::{ParticipantData, RecordCheck, Simulator, StudyPlan, Trial};
@@ -89,7 +90,7 @@ impl Log {
             check.add(plan, record).map_err(|problem| wrong(*line, problem))?;
         }
         if is_torn {
-            let file = open_for_append(path)?;
+            let file = open_existing_for_append(path)?;
             let shortened = file.set_len(n_bytes as u64).and_then(|()| file.sync_all());
             shortened.map_err(FileError::context("shorten", path))?;
         }
@@ -240,24 +241,17 @@ impl Log {
 
     /// Reads the stored lines.
     pub fn read_stored(&self) -> std::result::Result<String, Refusal> {
-        self.check_present()?;
-        let bytes = read_bounded(&self.path, self.n_bytes as u64)?;
+        let bytes = read_bounded(&self.path, self.n_bytes as u64).map_err(refusal_of)?;
         String::from_utf8(bytes).map_err(|_| Refusal::Changed)
-    }
-
-    fn check_present(&self) -> std::result::Result<(), Refusal> {
-        match kind(&self.path)? {
-            EntryKind::Missing => Err(Refusal::Unknown),
-            _ => Ok(()),
-        }
     }
 
     /// Appends bytes, synchronized; after a failure the file is as before, or shortened at the next write.
     fn write(&mut self, bytes: &[u8]) -> std::result::Result<(), Refusal> {
-        self.check_present()?;
-        let mut file = open_for_append(&self.path)?;
+        // Another program may remove the file at any time, for example `chaic study delete`.
+        let mut file = open_existing_for_append(&self.path).map_err(refusal_of)?;
         let metadata = fs::metadata(&self.path);
-        let length = metadata.map_err(FileError::context("read the size of", &self.path))?.len();
+        let metadata = metadata.map_err(FileError::context("read the size of", &self.path));
+        let length = metadata.map_err(refusal_of)?.len();
         let expected = self.n_bytes as u64;
         if length != expected && !self.is_torn {
             return Err(Refusal::Changed);
@@ -276,6 +270,15 @@ impl Log {
             let _ = file.set_len(expected);
         }
         Ok(written.map_err(FileError::context("write", &self.path))?)
+    }
+}
+
+/// Returns the refusal for a failed operation on the file of a participant; without the file, the participant is
+/// unknown.
+fn refusal_of(error: FileError) -> Refusal {
+    match error.error.kind() {
+        ErrorKind::NotFound => Refusal::Unknown,
+        _ => error.into(),
     }
 }
 

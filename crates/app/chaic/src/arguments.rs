@@ -33,7 +33,9 @@ pub use self::contest::{
     SubmitPackArguments, SubmitRunArguments, SubmitScoreArguments, SubmitVerifyArguments,
 };
 pub use self::episodes::{EpisodesCommand, ImportCommand, ImportHalf, OriginalArguments};
-pub use self::eval::{EvalArguments, EvalCommand, LanguageArguments, ModelEvaluation};
+pub use self::eval::{
+    EndpointArguments, EvalArguments, EvalCommand, LanguageArguments, ModelEvaluation,
+};
 pub use self::exec::{
     ExecArguments, HelperArgument, HelperCheckArguments, HelperCommand, HelperServeArguments,
 };

@@ -34,6 +34,7 @@ mod datasets;
 mod eval_partners;
 mod eval_session;
 mod given_partners;
+mod output_path;
 mod recorded;
 mod run_perception;
 mod sealed;

@@ -25,10 +25,9 @@ pub enum OutputFormat {
     /// JSON for programs.
     Json,
     /// Markdown; `chaic report` only.
-    #[value(name = "md", hide = true)]
+    #[value(name = "md")]
     Markdown,
     /// Comma-separated values; `chaic report` only.
-    #[value(hide = true)]
     Csv,
 }
 
@@ -98,6 +97,11 @@ pub fn print_result(format: OutputFormat, json: &impl Serialize, text: &str) -> 
         OutputFormat::Json => print(&(serde_json::to_string_pretty(json)? + "\n")),
         _ => print(text),
     }
+}
+
+/// Returns a path for JSON. Bytes that are not UTF-8 are replaced, since JSON has no way to write them.
+pub fn json_path(path: &Path) -> String {
+    path.to_string_lossy().into_owned()
 }
 
 /// Formats a count with a regular plural: `1 task`, `2 tasks`.

@@ -5,19 +5,22 @@ use chaic_env::rules::rule_names;
 
 use crate::exit::env_error;
 
-/// Smallest Jaro similarity of a suggestion, 0 to 1; clap has the same threshold.
-const MIN_SIMILARITY: f64 = 0.7;
+/// Largest number of typing errors between a name and a suggestion: characters that were added, left out,
+/// replaced, or swapped with their neighbor.
+const MAX_ERRORS: usize = 2;
 
-/// Returns the known name that is most similar to an unknown one, if any is similar enough.
+/// Returns the known name with the fewest typing errors: at most [`MAX_ERRORS`], and at most half as many as the
+/// given name has characters.
 pub fn similar_name<S: AsRef<str>>(
     name: &str,
     known: impl IntoIterator<Item = S>,
 ) -> Option<String> {
+    let max_errors = MAX_ERRORS.min(name.chars().count() / 2);
     known
         .into_iter()
-        .map(|candidate| (strsim::jaro(name, candidate.as_ref()), candidate))
-        .filter(|(similarity, _)| *similarity > MIN_SIMILARITY)
-        .max_by(|(a, _), (b, _)| a.total_cmp(b))
+        .map(|candidate| (strsim::damerau_levenshtein(name, candidate.as_ref()), candidate))
+        .filter(|(n_errors, _)| *n_errors <= max_errors)
+        .min_by_key(|(n_errors, _)| *n_errors)
         .map(|(_, candidate)| candidate.as_ref().to_owned())
 }
 
@@ -66,6 +69,8 @@ mod tests {
         let known = ["none", "random", "rhp", "oracle", "follow"];
         assert_eq!(similar_name("randmo", known).as_deref(), Some("random"));
         assert_eq!(similar_name("orakel", known).as_deref(), Some("oracle"));
+        assert_eq!(similar_name("rph", known).as_deref(), Some("rhp"));
+        assert_eq!(similar_name("foo", known), None);
         assert_eq!(similar_name("nobody", known), None);
         assert_eq!(similar_name("", known), None);
     }

@@ -11,8 +11,9 @@ mod output_file;
 
 pub use kind::{Entry, EntryKind, is_file_below, kind, kind_below, walk};
 pub use open::{
-    create_executable, create_folders_below, create_or_replace, open_file, open_for_append,
-    open_or_create, open_user_file, read_below, read_bounded, read_user_file,
+    create_executable, create_folders_below, create_or_replace, open_existing_for_append,
+    open_file, open_for_append, open_or_create, open_user_file, read_below, read_bounded,
+    read_user_file,
 };
 pub use output_file::OutputFile;
 

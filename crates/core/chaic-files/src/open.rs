@@ -67,6 +67,14 @@ pub fn open_file(path: &Path) -> Result<File> {
 /// # Errors
 /// If it is a link or no regular file, or the file system refuses.
 pub fn open_for_append(path: &Path) -> Result<OutputFile> {
+    open_to_write(path, File::options().append(true).create(true))
+}
+
+/// Opens an existing file for appending. A file that another process removes is not created again.
+///
+/// # Errors
+/// If there is none; if it is a link or no regular file, or the file system refuses.
+pub fn open_existing_for_append(path: &Path) -> Result<OutputFile> {
     open_to_write(path, File::options().append(true))
 }
 
@@ -75,15 +83,16 @@ pub fn open_for_append(path: &Path) -> Result<OutputFile> {
 /// # Errors
 /// If it is a link or no regular file, or the file system refuses.
 pub fn open_or_create(path: &Path) -> Result<OutputFile> {
-    open_to_write(path, File::options().read(true).write(true).truncate(false))
+    open_to_write(path, File::options().read(true).write(true).truncate(false).create(true))
 }
 
+/// Opens a file with these options, which say whether a missing one is created.
 fn open_to_write(path: &Path, options: &mut OpenOptions) -> Result<OutputFile> {
     let found = kind(path)?;
     if found != EntryKind::Missing {
         check_regular(path, found)?;
     }
-    let options = without_blocking(options, true).create(true);
+    let options = without_blocking(options, true);
     let file = perform(Operation::Open, path, || options.open(path));
     let file = check_opened(file.map_err(FileError::context("open", path))?, path)?;
     Ok(OutputFile::new(file, path))

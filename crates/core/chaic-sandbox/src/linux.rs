@@ -5,6 +5,7 @@ mod inner;
 mod landlock;
 mod outer;
 mod root;
+mod shared;
 mod usage;
 
 use std::fmt;

@@ -1,6 +1,7 @@
 //! Access rights of a sandboxed command.
 
 use std::env;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -12,7 +13,8 @@ pub struct Policy {
     pub start_folder: PathBuf,
     /// Readable files and folders outside the system folders, at the same paths.
     pub readable: Vec<PathBuf>,
-    /// Folders that appear empty to the command even inside readable ones.
+    /// Folders that appear empty to the command even inside readable ones. Without namespaces,
+    /// Landlock refuses access to them, and to lists of the readable folders that contain them.
     pub masked: Vec<PathBuf>,
     /// Memory of all processes, MiB: anonymous and shared pages.
     pub memory_mib: u64,
@@ -60,16 +62,39 @@ impl Policy {
 
     /// Adds the files in a command line with their folders, and the installation folders of its
     /// programs. Never adds a folder that contains the start folder, a masked folder or the home
-    /// folder.
+    /// folder: of a program there it adds the file alone.
     pub fn add_from_command_line(&mut self, line: &str) {
+        self.add_words(line, &env::var_os("PATH").unwrap_or_default());
+    }
+
+    /// Adds the files and programs of a command line, with the folders of a search path.
+    fn add_words(&mut self, line: &str, search_path: &OsStr) {
         for word in split_words(line) {
             let file = self.start_folder.join(&word);
             if file.is_file() {
                 self.add_file(&file);
             } else if !word.contains('/') {
-                let folders = program_folders(&word);
-                folders.into_iter().for_each(|folder| self.add_unless_too_wide(folder));
+                let mut folders = env::split_paths(search_path);
+                let found = folders.find_map(|folder| {
+                    // An entry of the search path may be relative.
+                    let program = self.start_folder.join(folder).join(&word);
+                    program.is_file().then_some(program)
+                });
+                if let Some(program) = found {
+                    self.add_program(&program);
+                }
             }
+        }
+    }
+
+    /// Adds the installation folders of a program and of the target of its link.
+    fn add_program(&mut self, program: &Path) {
+        let target = program.canonicalize().unwrap_or_else(|_| program.to_owned());
+        for path in [program.to_owned(), target] {
+            if let Some(folder) = installation_folder(&path) {
+                self.add_unless_too_wide(folder.to_owned());
+            }
+            self.add_unless_readable(path);
         }
     }
 
@@ -83,9 +108,13 @@ impl Policy {
             if let Some(folder) = path.parent() {
                 self.add_unless_too_wide(folder.to_owned());
             }
-            if !self.is_readable(&path) && !is_system(&path) {
-                self.add(path);
-            }
+            self.add_unless_readable(path);
+        }
+    }
+
+    fn add_unless_readable(&mut self, path: PathBuf) {
+        if !self.is_readable(&path) && !is_system(&path) {
+            self.add(path);
         }
     }
 
@@ -122,24 +151,12 @@ fn split_words(line: &str) -> Vec<String> {
     line.split(is_separator).map(unquoted).filter(|word| !word.is_empty()).collect()
 }
 
-/// Returns the installation folders of a program on the search path: the parent of each `bin` or
-/// `shims` folder that contains the program or the target of its link. Empty for programs in system
-/// folders.
-fn program_folders(program: &str) -> Vec<PathBuf> {
-    let path = env::var_os("PATH").unwrap_or_default();
-    let found = env::split_paths(&path).map(|folder| folder.join(program)).find(|p| p.is_file());
-    let Some(found) = found else { return Vec::new() };
-    let target = found.canonicalize().unwrap_or_else(|_| found.clone());
-    let installation = |path: &Path| {
-        let bin = path.parent()?;
-        let is_bin = bin.ends_with("bin") || bin.ends_with("shims");
-        Some(if is_bin { bin.parent()? } else { bin }.to_owned())
-    };
-    [installation(&found), installation(&target)]
-        .into_iter()
-        .flatten()
-        .filter(|path| !is_system(path))
-        .collect()
+/// Returns the installation folder of a program: its folder, or the parent of a folder `bin` or
+/// `shims`.
+fn installation_folder(program: &Path) -> Option<&Path> {
+    let folder = program.parent()?;
+    let is_bin = folder.ends_with("bin") || folder.ends_with("shims");
+    if is_bin { folder.parent() } else { Some(folder) }
 }
 
 /// Folders of the operating system that every sandboxed command can read.
@@ -198,6 +215,32 @@ mod tests {
                 || policy.is_readable(&top.join("./beside.py"))
         );
         assert!(!policy.is_readable(&top.join("runs")), "{policy:?}");
+    }
+
+    #[test]
+    fn a_program_is_readable_with_its_installation_or_alone_if_that_is_too_wide() {
+        let top = tempfile::tempdir().unwrap();
+        let top = top.path().canonicalize().unwrap();
+        for folder in ["bin", "tool", "tool/bin", "work"] {
+            std::fs::create_dir(top.join(folder)).unwrap();
+        }
+        for program in ["bin/helper", "tool/bin/trainer"] {
+            std::fs::write(top.join(program), "").unwrap();
+        }
+        let search_path = env::join_paths([top.join("tool/bin"), "bin".into()]).unwrap();
+        let mut of_top = policy(&top);
+        of_top.add_words("helper --flag; trainer", &search_path);
+        for readable in ["bin/helper", "tool/lib"] {
+            assert!(of_top.is_readable(&top.join(readable)), "{readable}: {of_top:?}");
+        }
+        for hidden in ["bin/other", "work", "secret"] {
+            assert!(!of_top.is_readable(&top.join(hidden)), "{hidden}: {of_top:?}");
+        }
+        let mut of_work = policy(&top.join("work"));
+        of_work.masked.push(top.join("bin/runs"));
+        let search_path = env::join_paths([top.join("bin")]).unwrap();
+        of_work.add_words("helper", &search_path);
+        assert_eq!(of_work.readable, [top.join("bin/helper")]);
     }
 
     #[test]

@@ -11,36 +11,11 @@ use chaic_files::TEMPORARY_SUFFIX;
 use chaic_files::faults::{self, FaultKind, FaultPlan, Operation};
 use chaic_sandbox::Launcher;
 
-/// Exit code of a program that panicked.
-const PANICKED: i32 = 101;
+use crate::ended::Ended;
 
 /// End of the name of a temporary file with a process id, in lists of operations and in plans. The id
 /// differs in every process.
 const OF_PROCESS: &str = ".PROCESS.tmp";
-
-/// End of a command.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Ended {
-    /// Exit code; `None` after a signal.
-    pub code: Option<i32>,
-    /// Standard output.
-    pub stdout: String,
-    /// Standard error.
-    pub stderr: String,
-}
-
-impl Ended {
-    /// Returns what is wrong with the end of any command: a panic, or an exit code without one line of
-    /// explanation.
-    pub fn problem(&self) -> Option<String> {
-        let n_errors = self.stderr.lines().filter(|line| line.starts_with("error:")).count();
-        if self.code == Some(PANICKED) || self.stderr.contains("panicked") {
-            return Some(format!("panic: {}", self.stderr.trim()));
-        }
-        let is_explained = self.code == Some(0) || n_errors == 1 || !self.stdout.is_empty();
-        (!is_explained).then(|| format!("exit code {:?}, {n_errors} error lines", self.code))
-    }
-}
 
 /// Returns the command line of this program as `chaic`, in a folder.
 pub fn chaic(folder: &Path, fault: Option<&FaultPlan>, log: Option<&Path>) -> Result<Command> {

@@ -3,6 +3,7 @@
 //! **What it is not**: a part of the command. Only this program can let file operations fail.
 
 mod commands;
+mod ended;
 mod faults;
 mod folder;
 mod fuzz;

@@ -7,6 +7,7 @@ use anyhow::{Context as _, Result, bail};
 use chaic_env::CHAIC_VERSION;
 
 use crate::commands::run_ok;
+use crate::folder::{Contents, contents};
 
 /// Frames of the episodes: a few decisions of each agent.
 const FRAMES: u32 = 40;
@@ -61,6 +62,8 @@ pub struct Scenario {
     pub command: &'static str,
     /// Files and folders that it writes.
     pub outputs: &'static [&'static str],
+    /// True if the contents of its files are random, so that only their names are compared.
+    pub has_random_contents: bool,
     /// Way back after an interruption.
     pub recovery: Recovery,
     /// Readers of the result, which run after the interruption and again after the recovery.
@@ -94,6 +97,7 @@ pub const SCENARIOS: [Scenario; 11] = [
         steps: &EPISODE_STEPS,
         command: PLAY,
         outputs: &["run"],
+        has_random_contents: false,
         recovery: RESUME_RUN,
         readers: &RUN_READERS,
     },
@@ -109,6 +113,7 @@ pub const SCENARIOS: [Scenario; 11] = [
         ],
         command: "eval --resume --jobs 1 --out run",
         outputs: &["run"],
+        has_random_contents: false,
         recovery: Recovery::Repeat,
         readers: &RUN_READERS,
     },
@@ -127,6 +132,7 @@ pub const SCENARIOS: [Scenario; 11] = [
         ],
         command: "merge --out run a b",
         outputs: &["run"],
+        has_random_contents: false,
         recovery: RESUME_RUN,
         readers: &[
             Reader { command: "verify run", is_exact: true },
@@ -139,6 +145,7 @@ pub const SCENARIOS: [Scenario; 11] = [
         steps: &PLAYED,
         command: "report run --figure f.png",
         outputs: &["f.png"],
+        has_random_contents: false,
         recovery: Recovery::Repeat,
         readers: &[Reader { command: "verify run", is_exact: true }],
     },
@@ -148,6 +155,7 @@ pub const SCENARIOS: [Scenario; 11] = [
         steps: &PLAYED,
         command: "replay run shopping/gen/0 --out r.gif --every 10",
         outputs: &["r.gif"],
+        has_random_contents: false,
         recovery: Recovery::Repeat,
         readers: &[],
     },
@@ -157,6 +165,7 @@ pub const SCENARIOS: [Scenario; 11] = [
         steps: &PLAYED,
         command: "export lerobot run --out set --every 30 --size 32",
         outputs: &["set"],
+        has_random_contents: false,
         recovery: Recovery::StartOver,
         readers: &[],
     },
@@ -166,6 +175,7 @@ pub const SCENARIOS: [Scenario; 11] = [
         steps: &[GENERATE, Step::Shorten("e"), Step::Submission],
         command: "submit run mine --episodes e --jobs 1 --out results",
         outputs: &["results"],
+        has_random_contents: false,
         recovery: Recovery::Repeat,
         readers: &[Reader { command: "submit score results --out s.json", is_exact: true }],
     },
@@ -175,6 +185,7 @@ pub const SCENARIOS: [Scenario; 11] = [
         steps: &[COLLECT, Step::TrainingConfig(200)],
         command: "train opponent --config c.toml --out t",
         outputs: &["t"],
+        has_random_contents: false,
         recovery: RESUME_TRAINING,
         readers: &[],
     },
@@ -184,6 +195,7 @@ pub const SCENARIOS: [Scenario; 11] = [
         steps: &[COLLECT, Step::TrainingConfig(3000)],
         command: "train opponent --config c.toml --out t",
         outputs: &["t"],
+        has_random_contents: false,
         recovery: RESUME_TRAINING,
         readers: &[],
     },
@@ -193,6 +205,7 @@ pub const SCENARIOS: [Scenario; 11] = [
         steps: &[Step::Run("episodes seal --secret s --task shopping --n-episodes 2 --out first")],
         command: "episodes seal --secret s --task shopping --n-episodes 2 --out sealed",
         outputs: &["sealed"],
+        has_random_contents: false,
         recovery: Recovery::Repeat,
         readers: &[Reader {
             command: "episodes open --secret s --commitment sealed/commitment.json --out opened",
@@ -204,7 +217,8 @@ pub const SCENARIOS: [Scenario; 11] = [
         is_long: false,
         steps: &[],
         command: "episodes seal --secret s --task shopping --n-episodes 1 --out sealed",
-        outputs: &[],
+        outputs: &["s", "sealed"],
+        has_random_contents: true,
         recovery: Recovery::Repeat,
         readers: &[Reader {
             command: "episodes open --secret s --commitment sealed/commitment.json --out opened",
@@ -233,6 +247,18 @@ impl Scenario {
         fs::create_dir(&inputs)?;
         prepare(self.steps, &inputs).with_context(|| format!("scenario {}", self.name))?;
         Ok(inputs)
+    }
+
+    /// Reads the files of the result in the folder `at`, with empty contents if those are random.
+    ///
+    /// # Errors
+    /// If the file system refuses.
+    pub fn result(&self, at: &Path) -> Result<Contents> {
+        let mut found = contents(at, self.outputs)?;
+        if self.has_random_contents {
+            found.values_mut().for_each(Vec::clear);
+        }
+        Ok(found)
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Context as _, Result};
 
 use crate::commands::{FileOperation, operations, run, run_ok};
-use crate::folder::{Contents, contents, copy, differences};
+use crate::folder::{Contents, copy, differences};
 use crate::scenario::{Recovery, Scenario, words};
 
 /// A scenario with its inputs and the result of an undisturbed command.
@@ -16,7 +16,7 @@ pub struct Trial<'a> {
     pub inputs: &'a Path,
     /// File operations of the command, sorted.
     pub operations: Vec<FileOperation>,
-    /// Files of the result.
+    /// Files of the result, as [`Scenario::result`] returns them.
     pub expected: Contents,
     /// Output of each reader of the complete result.
     read: Vec<String>,
@@ -27,7 +27,7 @@ impl<'a> Trial<'a> {
     /// files.
     ///
     /// # Errors
-    /// If they differ, or the command fails.
+    /// If they differ, the command fails, or the scenario compares no file.
     pub fn new(scenario: &'a Scenario, inputs: &'a Path, folder: &Path) -> Result<Trial<'a>> {
         let log = folder.join("operations");
         let mut trials = Vec::new();
@@ -39,7 +39,8 @@ impl<'a> Trial<'a> {
             let read: Result<Vec<String>> = readers
                 .map(|reader| run_ok(&at, &words(reader.command)).map(|ended| ended.stdout))
                 .collect();
-            let expected = contents(&at, scenario.outputs)?;
+            let expected = scenario.result(&at)?;
+            anyhow::ensure!(!expected.is_empty(), "scenario {} compares no file", scenario.name);
             trials.push(Trial { scenario, inputs, operations, expected, read: read? });
         }
         let trial = trials.swap_remove(0);
@@ -98,7 +99,7 @@ impl<'a> Trial<'a> {
     pub fn complete(&self, at: &Path) -> Result<()> {
         let command = self.way_back(at)?;
         run_ok(at, &words(command)).context("the way back")?;
-        let changed = differences(&contents(at, self.scenario.outputs)?, &self.expected);
+        let changed = differences(&self.scenario.result(at)?, &self.expected);
         anyhow::ensure!(changed.is_empty(), "different files after `{command}`: {changed:?}");
         for (reader, expected) in self.scenario.readers.iter().zip(&self.read) {
             let read = run_ok(at, &words(reader.command)).context("after the way back")?;

@@ -1,7 +1,12 @@
 //! Promise: a small sample of every measurement of docs/reliability.md passes, and a broken promise is
 //! reported.
 
+#[path = "../src/ended.rs"]
+mod ended;
+
 use std::process::{Command, Output};
+
+use ended::Ended;
 
 fn reliability(arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_chaic-reliability"));
@@ -21,6 +26,28 @@ fn file_faults_of_a_merge_and_of_seals_leave_no_corrupt_result() {
     assert_eq!(table.lines().count(), 5, "{table}");
     let n_failures = |line: &str| line.split('|').nth(4).map(|cell| cell.trim().to_owned());
     assert!(table.lines().skip(2).all(|line| n_failures(line).as_deref() == Some("0")), "{table}");
+}
+
+#[test]
+fn output_explains_findings_but_no_other_exit_code() {
+    let problem = |code: Option<i32>, stdout: &str, stderr: &str| {
+        Ended { code, stdout: stdout.to_owned(), stderr: stderr.to_owned() }.problem()
+    };
+    for code in [Some(1), Some(2)] {
+        assert_eq!(problem(code, "", "error: the disk is full\n"), None);
+        assert_eq!(problem(code, "a table\n", "note\nerror: the disk is full\n"), None);
+        assert!(problem(code, "a table\n", "error: first\nerror: second\n").is_some());
+    }
+    assert_eq!(problem(Some(0), "", ""), None);
+    assert_eq!(problem(Some(1), "FOUND a file of no episode run\n", ""), None);
+    let unexplained = [(Some(1), ""), (Some(1), "\n"), (Some(2), "a table\n"), (None, "a table\n")];
+    for (code, stdout) in unexplained {
+        assert!(problem(code, stdout, "warning: slow\n").is_some(), "{code:?}, {stdout:?}");
+    }
+    for code in [Some(0), Some(101)] {
+        let panic = problem(code, "a table\n", "thread 'main' panicked at a.rs\n");
+        assert!(panic.is_some_and(|text| text.starts_with("panic: ")), "{code:?}");
+    }
 }
 
 #[test]

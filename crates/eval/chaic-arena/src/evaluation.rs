@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use chaic_env::helper_registry::HelperRegistry;
 use chaic_eval::EvalError;
 use chaic_eval::metrics::RunResult;
+use chaic_eval::run::RunFolder;
 use chaic_eval::suite::SuiteFolder;
 use chaic_eval::verify::{VerificationReport, verify_run};
 use chaic_files::{EntryKind, FolderLock, create_folders, kind, read_bounded, write_atomically};
 
-use crate::error::Result;
+use crate::error::{ArenaError, Result};
 use crate::played::PlayedRun;
 use crate::score::SubmissionScore;
 use crate::sealed::Commitment;
@@ -94,6 +95,22 @@ impl Evaluation {
         kind(&self.folder.join(SUBMISSION)).is_ok_and(|kind| kind == EntryKind::Folder)
     }
 
+    /// Checks that the folder has a submission with a run.
+    ///
+    /// # Errors
+    /// [`ArenaError::Score`] if one of them is missing.
+    pub fn check_parts(&self) -> Result<()> {
+        let run = self.run_folder();
+        let problem = if !self.exists() {
+            "it has no submission; name the folder that `chaic submit run` wrote"
+        } else if !RunFolder::is_run(&run) && !SuiteFolder::is_suite(&run) {
+            "its run is missing; repeat `chaic submit run` to play it"
+        } else {
+            return Ok(());
+        };
+        Err(ArenaError::Score { path: self.folder.clone(), problem: problem.to_owned() })
+    }
+
     /// Puts a submission into the folder: extracts an archive, or copies a folder. An evaluation that was
     /// started with the same submission is continued.
     ///
@@ -130,8 +147,9 @@ impl Evaluation {
     /// Computes the score from the run. The run is not verified.
     ///
     /// # Errors
-    /// Those of [`PlayedRun::read`] and [`SubmissionScore::new`].
+    /// Those of [`Evaluation::check_parts`], [`PlayedRun::read`] and [`SubmissionScore::new`].
     pub fn score(&self) -> Result<SubmissionScore> {
+        self.check_parts()?;
         SubmissionScore::new(&self.submission()?, &PlayedRun::read(&self.run_folder())?)
     }
 

@@ -66,6 +66,8 @@ struct ConfirmedEntry {
     score: SubmissionScore,
     /// Results that the table compares: with all partners of the list, or with the ordinary partner.
     results: Vec<RunResult>,
+    /// Results that are compared with `none`; `None` if they all are.
+    compared: Option<Vec<RunResult>>,
     environments: Environments,
 }
 
@@ -91,8 +93,13 @@ impl LeaderboardBuilder {
             return self.refuse(folder, problem);
         }
         let EvaluationReport { score, run, .. } = report;
-        let (results, environments) = (run.ranked_results(), run.environments());
-        let entry = ConfirmedEntry { folder: name(folder), score, results, environments };
+        let entry = ConfirmedEntry {
+            folder: name(folder),
+            score,
+            results: run.ranked_results(),
+            compared: run.compared_results(),
+            environments: run.environments(),
+        };
         self.add_entry(folder, entry);
     }
 
@@ -113,6 +120,14 @@ impl LeaderboardBuilder {
             tables: tables.collect(),
             refused: self.refused,
         }
+    }
+}
+
+impl ConfirmedEntry {
+    /// Returns the results of a helper that are compared with those of a reference.
+    fn compared_with<'a>(&'a self, reference: &str, helper: &'a str) -> HelperResults<'a> {
+        let compared = self.compared.as_ref().filter(|_| reference == NONE);
+        HelperResults { results: compared.unwrap_or(&self.results), helper }
     }
 }
 
@@ -190,14 +205,12 @@ fn table(conditions: EvaluationConditions, entries: &[ConfirmedEntry]) -> Leader
     }
     let has_preferred = references.contains_key(PREFERRED_REFERENCE);
     let reference = if has_preferred { PREFERRED_REFERENCE } else { NONE };
-    let baseline = references
-        .get(reference)
-        .map(|entry| HelperResults { results: &entry.results, helper: reference });
+    let baseline = references.get(reference).map(|entry| entry.compared_with(reference, reference));
     let differences: Vec<Option<RowDifference>> = entries
         .iter()
         .map(|entry| {
             let helper = &entry.score.submission.name;
-            let own = HelperResults { results: &entry.results, helper };
+            let own = entry.compared_with(reference, helper);
             let all = paired_difference(own, baseline?, environments).all?;
             Some(RowDifference::new(&all, two_sided_p(&all)))
         })

@@ -1,12 +1,14 @@
 //! The run of a submission, read from its folder.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
+use chaic_core::TaskId;
 use chaic_core::capability::PersonChange;
 use chaic_env::RunKey;
+use chaic_env::helper_registry::NONE;
 use chaic_env::partner_suite::SuitePartner;
 use chaic_episodes::Episode;
-use chaic_eval::EvalError;
 use chaic_eval::metrics::{Environments, RunResult};
 use chaic_eval::run::{RunFolder, environments, planned, read_results};
 use chaic_eval::suite::{PartnerRun, SuiteFolder};
@@ -34,7 +36,7 @@ impl PlayedRun {
     pub fn read(path: &Path) -> Result<PlayedRun> {
         if !SuiteFolder::is_suite(path) {
             let run = read_run(path, SuitePartner::ordinary())?;
-            let episodes = episodes(&run).collect::<Result<Vec<Episode>>>()?;
+            let episodes = run.episodes().collect::<chaic_eval::Result<Vec<Episode>>>()?;
             return Ok(PlayedRun { runs: vec![run], suite: None, episodes });
         }
         let folder = SuiteFolder::read(path)?;
@@ -50,8 +52,13 @@ impl PlayedRun {
             }
             runs.push(read_run(&path, partner)?);
         }
-        let episodes = episodes(&runs[0]).collect::<Result<Vec<Episode>>>()?;
-        runs[1..].iter().try_for_each(|run| check_episodes(run, &episodes))?;
+        let episodes = runs[0].episodes().collect::<chaic_eval::Result<Vec<Episode>>>()?;
+        for run in &runs[1..] {
+            if let Some(problem) = run.episode_difference(&episodes)? {
+                let path = run.folder.path().to_owned();
+                return Err(ArenaError::Score { path, problem });
+            }
+        }
         Ok(PlayedRun { runs, suite: Some(folder), episodes })
     }
 
@@ -91,7 +98,18 @@ impl PlayedRun {
         if self.suite.is_none() {
             return self.ordinary().results.clone();
         }
-        pooled(self.list_runs().iter().map(|run| (run.partner.person, run.results.as_slice())))
+        pooled(self.list_results())
+    }
+
+    /// Returns the [ranked results](PlayedRun::ranked_results) that are compared with `none`;
+    /// `None` if they are all compared.
+    pub(crate) fn compared_results(&self) -> Option<Vec<RunResult>> {
+        self.suite.as_ref().and_then(|_| compared(self.list_results()))
+    }
+
+    /// Returns the results with each partner of the list, and the change of its person.
+    fn list_results(&self) -> impl Iterator<Item = (Option<PersonChange>, &[RunResult])> {
+        self.list_runs().iter().map(|run| (run.partner.person, run.results.as_slice()))
     }
 }
 
@@ -113,6 +131,39 @@ pub(crate) fn pooled<'a>(
     pooled
 }
 
+/// Joins the results with several partners that are compared with `none`, as [`pooled`] does;
+/// returns `None` if they are all compared. If the run of `none` with an episode, partner and seed
+/// failed, those of all helpers are left out. Otherwise the means with and without helper would be
+/// over different partners.
+pub(crate) fn compared<'a>(
+    runs: impl IntoIterator<Item = (Option<PersonChange>, &'a [RunResult])>,
+) -> Option<Vec<RunResult>> {
+    let runs: Vec<(Option<PersonChange>, &[RunResult])> = runs.into_iter().collect();
+    if !runs.iter().any(|(_, results)| results.iter().any(is_failed_alone)) {
+        return None;
+    }
+    let kept: Vec<(Option<PersonChange>, Vec<RunResult>)> =
+        runs.into_iter().map(|(person, results)| (person, without_failed_alone(results))).collect();
+    Some(pooled(kept.iter().map(|(person, results)| (*person, results.as_slice()))))
+}
+
+/// Returns the results of all helpers whose episode and seed `none` completed.
+fn without_failed_alone(results: &[RunResult]) -> Vec<RunResult> {
+    let failed: BTreeSet<(TaskId, &str, u32)> =
+        results.iter().filter(|result| is_failed_alone(result)).map(played_episode).collect();
+    let is_kept = |result: &&RunResult| !failed.contains(&played_episode(result));
+    results.iter().filter(is_kept).cloned().collect()
+}
+
+fn is_failed_alone(result: &RunResult) -> bool {
+    result.key.helper == NONE && result.summary().is_none()
+}
+
+/// Returns task, episode and seed.
+fn played_episode(result: &RunResult) -> (TaskId, &str, u32) {
+    (result.key.task, result.key.episode.as_str(), result.key.seed)
+}
+
 /// Reads the run with one partner.
 fn read_run(path: &Path, partner: SuitePartner) -> Result<PartnerRun> {
     let (folder, options) = RunFolder::read(path)?;
@@ -131,41 +182,4 @@ fn read_run(path: &Path, partner: SuitePartner) -> Result<PartnerRun> {
     }
     results.sort_by(|a, b| a.key.cmp(&b.key));
     Ok(PartnerRun { partner, folder, options, planned, results })
-}
-
-/// Reads the episodes of a run, in the order of tasks and numbers.
-fn episodes(run: &PartnerRun) -> impl Iterator<Item = Result<Episode>> {
-    let mut keys: Vec<&RunKey> = run.planned.iter().map(|job| &job.key).collect();
-    // The numbers of more than 1,000 episodes differ in length.
-    keys.sort_by_key(|key| (key.task, key.episode.len(), &key.episode));
-    keys.dedup_by_key(|key| (key.task, &key.episode));
-    keys.into_iter().map(move |key| Ok(run.folder.episode(&run.options, key)?))
-}
-
-/// Checks that a run has these episodes with its partner.
-fn check_episodes(run: &PartnerRun, ordinary: &[Episode]) -> Result<()> {
-    let path = || run.folder.path().to_owned();
-    let mut n_found = 0;
-    for found in episodes(run) {
-        let found = found?;
-        let expected = match (ordinary.get(n_found).cloned(), run.partner.person) {
-            (Some(episode), Some(change)) => {
-                Some(episode.with_partner(change).map_err(EvalError::from)?)
-            }
-            (episode, _) => episode,
-        };
-        if expected.as_ref() != Some(&found) {
-            let problem =
-                format!("{} is not that of the run with the ordinary partner", found.id());
-            return Err(ArenaError::Score { path: path(), problem });
-        }
-        n_found += 1;
-    }
-    if n_found == ordinary.len() {
-        return Ok(());
-    }
-    let n = ordinary.len();
-    let problem =
-        format!("it has {n_found} of the {n} episodes of the run with the ordinary partner");
-    Err(ArenaError::Score { path: path(), problem })
 }

@@ -58,7 +58,8 @@ pub struct SubmissionScore {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PartnersScore {
     /// Scores by task and helper over the episode runs with all partners of the list. EI and intervals are
-    /// over episodes; seeds and partners are averaged.
+    /// over episodes; seeds and partners are averaged. EI leaves out each episode, partner and seed
+    /// whose run of `none` failed.
     pub tasks: BTreeMap<TaskId, BTreeMap<String, Score>>,
     /// Robustness by helper, as in `robustness.json`.
     pub robustness: Vec<HelperRobustness>,
@@ -211,16 +212,37 @@ impl PartnersScore {
     /// Scores the runs with the partners of the list.
     fn new(run: &PlayedRun) -> Result<PartnersScore> {
         let (results, environments) = (run.ranked_results(), run.environments());
-        let played =
-            PlayedEpisodes { results: &results, planned: &[], environments: &environments };
+        let compared = run.compared_results();
         let list = run.list_runs().iter().map(|partner| PartnerScore::new(partner, &environments));
         let list: Result<Vec<PartnerScore>> = list.collect();
         Ok(PartnersScore {
-            tasks: Scores::new(played, &FormulaSet::Paper.formulas()).tasks,
+            tasks: pooled_tasks(&results, compared.as_deref(), &environments),
             robustness: Robustness::from_runs(run.runs()).helpers().to_vec(),
             list: list?,
         })
     }
+}
+
+/// Returns the scores by task and helper of results with several partners. EI is computed from
+/// `compared` if it is given.
+pub(crate) fn pooled_tasks(
+    results: &[RunResult],
+    compared: Option<&[RunResult]>,
+    environments: &Environments,
+) -> BTreeMap<TaskId, BTreeMap<String, Score>> {
+    let tasks = |results: &[RunResult]| {
+        let played = PlayedEpisodes { results, planned: &[], environments };
+        Scores::new(played, &FormulaSet::Paper.formulas()).tasks
+    };
+    let mut scores = tasks(results);
+    let Some(compared) = compared.map(tasks) else { return scores };
+    for (task, row) in &mut scores {
+        for (helper, score) in row {
+            let other = compared.get(task).and_then(|row| row.get(helper));
+            (score.ei, score.ei_ci) = other.map_or((None, None), |other| (other.ei, other.ei_ci));
+        }
+    }
+    scores
 }
 
 impl PartnerScore {

@@ -325,6 +325,8 @@ impl SealedSplit {
 mod tests {
     use std::collections::BTreeSet;
 
+    use chaic_episodes::{Split, episodes};
+
     use super::*;
 
     fn split(digit: char) -> SealedSplit {
@@ -451,6 +453,85 @@ mod tests {
         for text in damaged {
             let result = Commitment::parse(text.as_bytes());
             assert!(matches!(result, Err(ArenaError::Format(_))), "{text}");
+        }
+    }
+
+    /// Measures of the difficulty of an episode.
+    const MEASURES: [&str; 5] = [
+        "number of objects",
+        "area, square meters",
+        "required objects",
+        "goal places",
+        "mean distance of wanted objects to the nearest goal place, meters",
+    ];
+
+    /// Returns the values of [`MEASURES`].
+    fn measures(episode: &Episode) -> [f64; MEASURES.len()] {
+        let setup = episode.setup();
+        let point = |k: usize| {
+            let position = setup.things[k].position;
+            [f64::from(position.x), f64::from(position.z)]
+        };
+        let index = |id| setup.thing_index(id).expect("goal places are objects");
+        let places: Vec<[f64; 2]> = setup.goal_places.iter().map(|id| point(index(*id))).collect();
+        let distance_m = |[ax, az]: [f64; 2], [bx, bz]: [f64; 2]| {
+            ((ax - bx) * (ax - bx) + (az - bz) * (az - bz)).sqrt()
+        };
+        let to_goal_m = |k: usize| {
+            places.iter().map(|place| distance_m(point(k), *place)).fold(f64::INFINITY, f64::min)
+        };
+        let is_wanted = |k: &usize| setup.goal.count(setup.things[*k].class) > 0;
+        let distances_m: Vec<f64> =
+            (0..setup.things.len()).filter(is_wanted).map(to_goal_m).collect();
+        let size_m = setup.bounds.size();
+        [
+            setup.things.len() as f64,
+            f64::from(size_m.x) * f64::from(size_m.y),
+            f64::from(setup.goal.total()),
+            places.len() as f64,
+            distances_m.iter().sum::<f64>() / distances_m.len() as f64,
+        ]
+    }
+
+    /// Returns the mean of a sample and the square of its standard error.
+    fn mean_and_squared_error(sample: &[f64]) -> (f64, f64) {
+        let n = sample.len() as f64;
+        let mean = sample.iter().sum::<f64>() / n;
+        let squares: f64 = sample.iter().map(|value| (value - mean) * (value - mean)).sum();
+        (mean, squares / (n - 1.0) / n)
+    }
+
+    #[test]
+    fn statistics_of_a_sealed_split_equal_the_standard_splits_within_stated_bounds() {
+        /// Episodes of each task and split.
+        const N: usize = 16;
+        /// Largest difference of two means, in standard errors of the difference.
+        const MAX_ERRORS: f64 = 4.0;
+        /// Tolerance for rounding.
+        const ROUNDING: f64 = 1e-3;
+        let split = SealedSplit { n_episodes: N, ..split('6') };
+        for task in TaskId::paper() {
+            let sealed: Vec<[f64; MEASURES.len()]> =
+                (0..N).map(|k| measures(&split.episode(task, k).expect("an episode"))).collect();
+            let standard: Vec<[f64; MEASURES.len()]> = episodes(&Split::Standard, task)
+                .take(N)
+                .map(|episode| measures(&episode.expect("an episode")))
+                .collect();
+            assert_eq!(standard.len(), N);
+            for (k, name) in MEASURES.into_iter().enumerate() {
+                let [sealed, standard] = [&sealed, &standard].map(|episodes| {
+                    let sample: Vec<f64> = episodes.iter().map(|values| values[k]).collect();
+                    mean_and_squared_error(&sample)
+                });
+                let bound = MAX_ERRORS * (sealed.1 + standard.1).sqrt() + ROUNDING;
+                let difference = (sealed.0 - standard.0).abs();
+                assert!(
+                    difference <= bound,
+                    "{task}, {name}: {} sealed, {} standard; they differ by more than {bound}",
+                    sealed.0,
+                    standard.0
+                );
+            }
         }
     }
 

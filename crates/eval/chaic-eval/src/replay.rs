@@ -115,6 +115,7 @@ pub fn find_trace(
         .collect();
     let known = match traces.len() {
         0 => "no traces at all".to_owned(),
+        1 => format!("one trace, {}", examples.join(", ")),
         n => format!("{n} traces, for example {}", examples.join(", ")),
     };
     let mut wanted = episode.to_owned();

@@ -8,7 +8,7 @@ mod text_table;
 mod write;
 
 pub use coverage::{coverage, untraced_failures, untraced_note};
-pub use figure::write_figure;
+pub use figure::{drawn_interval, write_figure};
 pub use labels::{Labels, RecordedGrants, title};
 pub use tables::{
     additional, counts, diagnostics, intervals, main_result, pairs, resolutions, run_pairs, stuck,

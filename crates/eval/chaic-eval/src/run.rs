@@ -274,6 +274,11 @@ impl NewRun {
         }
         let options = request.new_options()?;
         check_options(&options, helpers)?;
+        for helper in &options.helpers {
+            for task in &options.tasks {
+                helpers.check_task(helper, *task).map_err(EvalError::Options)?;
+            }
+        }
         let source = request.episodes.as_ref();
         let episodes = source.map(|s| plan::read_source(s, &options)).transpose()?;
         let planned = plan::plan(&options, episodes.as_deref().unwrap_or_default())?;

@@ -4,6 +4,7 @@
 //! partner and for each partner of the list, and the robustness report. All commands that read runs
 //! read the runs inside it. They differ in the partner only.
 
+mod episodes;
 mod folder_check;
 mod report;
 

@@ -91,7 +91,7 @@ pub fn verify_run_until(
         granted,
         chaic: folder.version()?,
         finished: finished(&results),
-        has_diagnostics: results.iter().any(has_diagnostics),
+        has_diagnostics: folder.other_version()?.is_none() || results.iter().any(has_diagnostics),
         folder,
         options,
         helpers,
@@ -208,7 +208,8 @@ struct TraceVerifier<'a> {
     chaic: Option<String>,
     /// Results of episode runs that were played to their end.
     finished: BTreeMap<&'a RunKey, &'a RunResult>,
-    /// True if any result has diagnostic metrics.
+    /// True if results must have diagnostic metrics: those of this version, and those of another
+    /// one if any has them.
     has_diagnostics: bool,
 }
 
@@ -287,12 +288,15 @@ impl TraceVerifier<'_> {
     /// Returns the name of the first counter that is attributed to a built-in agent. Built-in
     /// agents have no counters, and traces hold none to compare with.
     fn counter_of_built_in_agent<'r>(&self, recorded: &'r RunResult) -> Option<&'r String> {
+        let rules = self.rules.planner;
+        let partner = self.options.partner.as_deref();
         let is_built_in = |name: &str| match name.split('.').next() {
             Some("helper") => {
-                helper_registry::find(&BuiltInHelpers, &recorded.key.helper, self.rules.planner)
-                    .is_ok()
+                helper_registry::find(&BuiltInHelpers, &recorded.key.helper, rules).is_ok()
             }
-            Some("partner") => self.options.partner.is_none(),
+            Some("partner") => {
+                helper_registry::find_partner(&BuiltInHelpers, partner, None, rules).is_ok()
+            }
             _ => true,
         };
         let mut counts = recorded.summary().into_iter().flat_map(|s| s.counts.keys());
@@ -318,12 +322,20 @@ impl TraceVerifier<'_> {
         }
     }
 
-    /// Compares the helper's perception in a trace with the one in `run.json`; returns the problem.
-    fn perception_problem(&self, header: &Header) -> Option<String> {
+    /// Compares perception, isolation and weights of the helper in a trace with those in
+    /// `run.json`; returns the problem.
+    fn run_file_problem(&self, header: &Header) -> Option<String> {
         let granted = self.granted.as_ref()?;
         let helper = header.people.iter().find(|p| p.agent == AgentId::HELPER)?;
-        let is_same = granted.perception.get(&header.helper) == helper.perception.as_ref();
-        (!is_same).then(|| "run.json names another perception of the helper".to_owned())
+        let fields = [
+            ("another perception", &granted.perception, &helper.perception),
+            ("another isolation", &granted.isolation, &helper.isolation),
+            ("other weights", &granted.weights, &helper.weights),
+        ];
+        let (difference, _, _) = fields
+            .into_iter()
+            .find(|&(_, recorded, actual)| recorded.get(&header.helper) != actual.as_ref())?;
+        Some(format!("run.json names {difference} of the helper"))
     }
 
     /// Compares the header of a trace with the expected one; returns the problem.
@@ -359,7 +371,7 @@ impl TraceVerifier<'_> {
         if let Some(problem) = self.grants_problem(&mut expected, header, is_unknown) {
             return Ok(Some(problem));
         }
-        if let Some(problem) = self.perception_problem(header) {
+        if let Some(problem) = self.run_file_problem(header) {
             return Ok(Some(problem));
         }
         let expected = Header { chaic: header.chaic.clone(), version: header.version, ..expected };

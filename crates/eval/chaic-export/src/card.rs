@@ -20,7 +20,9 @@ pub struct DatasetDescription {
     /// Gaps of the data.
     pub limitations: &'static [&'static str],
     /// Ways in which the data differs from the world.
-    pub biases: &'static [&'static str],
+    pub biases: Vec<&'static str>,
+    /// Statement about personal data.
+    pub personal_information: String,
     /// Tags for catalogues of data sets.
     pub tags: &'static [&'static str],
     /// Files of one kind.
@@ -94,15 +96,15 @@ pub enum Place {
 
 /// Facts that hold for all data sets of chaic.
 pub mod common {
-    /// Statement about personal data.
-    pub const PERSONAL_INFORMATION: &str =
+    /// Statement about personal data, for data without decisions of real people.
+    pub const NO_PERSONAL_INFORMATION: &str =
         "None. All people are simulated, and no recording of a real person was used.";
     /// Statement about effects on society.
     pub const SOCIAL_IMPACT: &str = "Helpers trained on simulated people with impairments can fail with real ones. The data must not \
         be the only evidence that an assistant is safe or useful for a person with a disability.";
     /// Biases of the simulation.
     pub const BIASES: &[&str] = &[
-        "People follow the rules of the paper and never change their minds, speak or refuse help.",
+        "Simulated people follow the rules of the paper and never change their minds, speak or refuse help.",
         "Constraints are simplified: one value each for reach, strength and speed, from the paper or chosen by chaic.",
         "Houses, streets and yards are those of chaic's generators, with goods of a Western household.",
     ];
@@ -129,9 +131,9 @@ impl DatasetDescription {
         };
         section("Intended use", self.uses);
         section("Limitations", self.limitations);
-        section("Biases", self.biases);
+        section("Biases", &self.biases);
         section("Effects on society", &[common::SOCIAL_IMPACT]);
-        section("Personal data", &[common::PERSONAL_INFORMATION]);
+        section("Personal data", &[self.personal_information.as_str()]);
         self.write_content(&mut text);
         text
     }

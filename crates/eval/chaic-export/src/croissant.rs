@@ -55,7 +55,7 @@ pub fn metadata(id: &str, description: &DatasetDescription) -> Value {
         "rai:dataLimitations": description.limitations,
         "rai:dataBiases": description.biases,
         "rai:dataSocialImpact": common::SOCIAL_IMPACT,
-        "rai:personalSensitiveInformation": common::PERSONAL_INFORMATION,
+        "rai:personalSensitiveInformation": description.personal_information,
         "distribution": distribution,
         "recordSet": [{
             "@type": "cr:RecordSet",

@@ -157,7 +157,8 @@ fn description(origin: Origin, n: usize) -> DatasetDescription {
             "Rooms and streets are boxes of simple geometry, drawn in plain colors.",
             "Files contain the hidden goal. A helper must not read them.",
         ],
-        biases: common::BIASES,
+        biases: common::BIASES.to_vec(),
+        personal_information: common::NO_PERSONAL_INFORMATION.to_owned(),
         tags: &["chaic", "embodied-ai", "human-ai-cooperation", "simulation", "accessibility"],
         files: vec![FileGroup {
             name: "episode-files",

@@ -1,12 +1,14 @@
 //! Export to version 3 of the LeRobot data set format: a table of frames and a video per episode,
 //! and tables of episodes and tasks.
 
+mod description;
+
 use std::path::{Path, PathBuf};
 
 use chaic_core::geom::math;
 use chaic_core::{Action, AgentId, EntityId, Frame, Hand, ResolvedAction};
 use chaic_env::Playback;
-use chaic_env::trace::{Decision, Trace};
+use chaic_env::trace::{Decision, Header, Trace};
 use chaic_episodes::Episode;
 use chaic_files::{create_folders, write_atomically};
 use chaic_render::{Channels, Scene, View};
@@ -15,10 +17,10 @@ use chaic_world::World;
 use image::RgbImage;
 use serde_json::{Value, json};
 
-use crate::card::{DataType, DatasetDescription, Field, FileGroup, Place, RecordSet, common};
 use crate::error::ExportError;
 use crate::folder::{NewFolder, write_description};
 use crate::table::{self, Column};
+use description::People;
 
 /// Frames per second of the export, as in replays. The world itself has no unit of seconds.
 pub const FRAMES_PER_S: u32 = 30;
@@ -97,6 +99,7 @@ struct EpisodeEntry {
     task: usize,
     first: usize,
     n_frames: usize,
+    people: People,
 }
 
 /// Running minimum, maximum, sum and sum of squares of each column of a feature.
@@ -226,19 +229,20 @@ impl LeRobotWriter {
         video.finish()?;
         self.colors = colors;
         let done = fraction_done(playback.world());
-        self.write_episode(&trace.header.task.info().title.to_lowercase(), &samples, done)?;
+        self.write_episode(&trace.header, &samples, done)?;
         Ok(true)
     }
 
     fn write_episode(
         &mut self,
-        task: &str,
+        header: &Header,
         samples: &[SampledFrame],
         done: f64,
     ) -> Result<(), ExportError> {
-        let known = self.tasks.iter().position(|t| t == task);
+        let task = header.task.info().title.to_lowercase();
+        let known = self.tasks.iter().position(|t| *t == task);
         let task_index = known.unwrap_or_else(|| {
-            self.tasks.push(task.to_owned());
+            self.tasks.push(task);
             self.tasks.len() - 1
         });
         let (index, first, n) = (self.episodes.len(), self.n_frames, samples.len());
@@ -273,7 +277,8 @@ impl LeRobotWriter {
         ];
         let path = self.file("data", index, "parquet")?;
         write_table(&path, &columns, &[])?;
-        self.episodes.push(EpisodeEntry { task: task_index, first, n_frames: n });
+        let people = People::of(header);
+        self.episodes.push(EpisodeEntry { task: task_index, first, n_frames: n, people });
         self.n_frames += n;
         Ok(())
     }
@@ -314,43 +319,6 @@ impl LeRobotWriter {
         json("info.json", &self.info())?;
         self.folder.finish();
         Ok(self.n_frames)
-    }
-
-    fn description(&self) -> DatasetDescription {
-        let agent = self.options.agent;
-        let n = self.episodes.len();
-        DatasetDescription {
-            title: format!("chaic runs: {agent}"),
-            summary: format!(
-                "Observations and actions of the {agent} in {n} recorded episodes of the benchmark Constrained Human-AI \
-                 Cooperation (CHAIC), in version 3.0 of the LeRobot format."
-            ),
-            collection: format!(
-                "Recorded by chaic {} and played again for the images, which have {} pixels a side and {} samples per \
-                 second (`chaic export lerobot`). Each trace was verified before.",
-                env!("CARGO_PKG_VERSION"),
-                self.options.image_size,
-                self.fps()
-            ),
-            uses: &[
-                "Imitation learning, offline reinforcement learning and models of behavior.",
-                "Scores of trained helpers come from `chaic eval` on other episodes.",
-            ],
-            limitations: &[
-                "The state vector holds the true position, which helpers on the hidden track estimate.",
-                "Videos are compressed; `chaic replay` and `chaic render` give exact images.",
-                "Depth images, object ids and the hidden goal are not included.",
-            ],
-            biases: common::BIASES,
-            tags: &["LeRobot", "chaic", "embodied-ai", "human-ai-cooperation", "simulation"],
-            files: file_groups(),
-            records: RecordSet {
-                name: "frames",
-                files: "data-files",
-                description: "one record per sampled frame, in the order of time.",
-                fields: frame_fields(),
-            },
-        }
     }
 
     fn write_episodes(&self) -> Result<(), ExportError> {
@@ -451,63 +419,6 @@ impl LeRobotWriter {
             },
         })
     }
-}
-
-fn file_groups() -> Vec<FileGroup> {
-    let group = |name, pattern, media_type, description| FileGroup {
-        name,
-        pattern,
-        media_type,
-        description,
-    };
-    vec![
-        group("data-files", "data/*/*.parquet", "application/x-parquet", "Frames of one episode"),
-        group("video-files", "videos/*/*/*.mp4", "video/mp4", "First-person video of one episode"),
-        group("task-files", "meta/tasks.parquet", "application/x-parquet", "Names of the tasks"),
-        group(
-            "episode-files",
-            "meta/episodes/*/*.parquet",
-            "application/x-parquet",
-            "Task, length and files of each episode",
-        ),
-        group("meta-files", "meta/*.json", "application/json", "Features and statistics"),
-    ]
-}
-
-/// Describes the columns that [`LeRobotWriter::write_episode`] writes.
-fn frame_fields() -> Vec<Field> {
-    let field = |name, data_type, description: &str| Field {
-        name,
-        data_type,
-        is_list: false,
-        description: description.to_owned(),
-        place: Place::Column(name),
-    };
-    let list = |name, description: String| Field {
-        is_list: true,
-        description,
-        ..field(name, DataType::Float, "")
-    };
-    vec![
-        list("observation.state", format!("State of the agent: {}", STATE.join(", "))),
-        list("action", format!("Action: {}; kinds are {}", ACTION.join(", "), KINDS.join(", "))),
-        field("plan", DataType::Text, "Current plan in words; empty if there is none"),
-        field(
-            "next.reward",
-            DataType::Float,
-            "Increase of the delivered fraction until the next sample",
-        ),
-        field("next.done", DataType::Boolean, "Whether this is the last sample of the episode"),
-        field(
-            "timestamp",
-            DataType::Float,
-            "Time since the start of the episode, s at 30 frames per second",
-        ),
-        field("frame_index", DataType::Integer, "Number of the sample within the episode"),
-        field("episode_index", DataType::Integer, "Number of the episode"),
-        field("index", DataType::Integer, "Number of the sample within the data set"),
-        field("task_index", DataType::Integer, "Number of the task in `meta/tasks.parquet`"),
-    ]
 }
 
 fn write_table(

@@ -1,6 +1,7 @@
 //! A recorded episode is exported to Parquet tables with one row per sampled frame, and the rewards
 //! sum up to the transport rate. An interrupted export is a complete data set of fewer episodes.
-//! Invalid options are reported before any file is written. A failed export leaves no data set.
+//! Invalid options are reported before any file is written. A failed export leaves no data set. The
+//! card says whether real people decided.
 
 use std::fs::{self, File};
 use std::path::Path;
@@ -9,7 +10,7 @@ use chaic_core::geom::math;
 use chaic_core::{AgentError, AgentId};
 use chaic_env::helper_registry::{BuiltInHelpers, find};
 use chaic_env::rules::RuleSet;
-use chaic_env::trace::{Record, Trace};
+use chaic_env::trace::{BranchPoint, Record, Trace};
 use chaic_env::{AdvanceOutcome, Env, EpisodeConfig};
 use chaic_episodes::{Episode, find_episode};
 use chaic_export::ExportError;
@@ -115,14 +116,59 @@ fn an_episode_is_exported_as_a_table_and_a_video() {
     assert_eq!(stats["observation.images.ego"]["count"][0].as_f64(), Some(n_pixels));
 }
 
-#[test]
-fn a_failed_export_leaves_nothing_and_can_be_repeated() {
+/// Returns the first frame of an episode.
+fn first_frame() -> (Episode, Trace) {
     let episode = find_episode("moving_house/gen/40000001").unwrap();
     let config = EpisodeConfig { image_size: Some(64), ..EpisodeConfig::new(&episode, "rhp") };
     let helper = find(&BuiltInHelpers, "rhp", RuleSet::PAPER.planner).unwrap();
     let header = Env::new(config, helper).unwrap().header().clone();
-    // The first frame alone.
-    let trace = Trace { header, records: Vec::new() };
+    (episode, Trace { header, records: Vec::new() })
+}
+
+#[test]
+fn the_card_says_whether_real_people_decided() {
+    let (episode, simulated) = first_frame();
+    let [mut real, mut repeated, mut continued] = [(); 3].map(|()| simulated.clone());
+    real.header.people[AgentId::HELPER.index()].input = Some("plans".to_owned());
+    repeated.header.people[AgentId::PARTNER.index()].recording =
+        Some("0123456789abcdef".to_owned());
+    continued.header.branch_of = Some(BranchPoint::new(b"another trace", 1));
+    // Returns the statement about personal data, and the biases.
+    let described = |traces: &[&Trace]| {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("set");
+        let mut writer = LeRobotWriter::create(&out, OPTIONS).unwrap();
+        for trace in traces {
+            assert!(writer.add(trace, &episode, &mut || true).unwrap());
+        }
+        writer.finish().unwrap();
+        let metadata = fs::read(out.join("croissant.json")).unwrap();
+        let metadata: serde_json::Value = serde_json::from_slice(&metadata).unwrap();
+        let personal = metadata["rai:personalSensitiveInformation"].as_str().unwrap().to_owned();
+        let biases = metadata["rai:dataBiases"].as_array().unwrap().clone();
+        let card = fs::read_to_string(out.join("README.md")).unwrap();
+        for text in biases.iter().map(|bias| bias.as_str().unwrap()).chain([personal.as_str()]) {
+            assert!(card.contains(text), "{text}: {card}");
+        }
+        (personal, biases.len())
+    };
+    let (none, n_biases) = described(&[&simulated]);
+    assert!(none.starts_with("None. "), "{none}");
+    let (personal, n_with_people) = described(&[&simulated, &real, &continued, &repeated]);
+    assert!(personal.contains("In 1 of 4 episodes a real person"), "{personal}");
+    assert!(personal.contains("In 2 of 4 episodes an agent repeats or continues"), "{personal}");
+    assert!(!personal.contains("None"), "{personal}");
+    assert!(n_with_people > n_biases);
+    for (trace, is_real) in [(&real, true), (&repeated, false), (&continued, false)] {
+        let (personal, _) = described(&[trace]);
+        assert_eq!(personal.contains("In 1 of 1 episodes a real person"), is_real, "{personal}");
+        assert!(!personal.contains("None"), "{personal}");
+    }
+}
+
+#[test]
+fn a_failed_export_leaves_nothing_and_can_be_repeated() {
+    let (episode, trace) = first_frame();
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("set");
     for is_new in [true, false] {

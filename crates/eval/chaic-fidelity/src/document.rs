@@ -15,7 +15,7 @@ use crate::switches;
 use chaic_eval::figure::{Bar, Bars, FigureError, HelperBars, transport_rate};
 use chaic_eval::metrics::{PlayedEpisodes, RunStatus, Scores};
 use chaic_eval::published::published;
-use chaic_eval::report::{coverage, shown_interval};
+use chaic_eval::report::{coverage, drawn_interval};
 use chaic_eval::{EvalError, Result};
 
 /// Largest document that is read, bytes: a hundred times the typical size.
@@ -159,7 +159,8 @@ impl<'a> ReportInputs<'a> {
         }
         let n_failed: usize = self.parts.iter().map(PartState::n_failed).sum();
         if n_failed > 0 {
-            let _ = writeln!(text, "**{n_failed} episode runs failed and count as zero:**\n");
+            let (runs, count) = if n_failed == 1 { ("run", "counts") } else { ("runs", "count") };
+            let _ = writeln!(text, "**{n_failed} episode {runs} failed and {count} as zero:**\n");
             for (part, result) in
                 self.parts.iter().flat_map(|p| p.results.iter().map(move |r| (p, r)))
             {
@@ -226,7 +227,7 @@ impl<'a> ReportInputs<'a> {
             let bar = |task: &TaskId| {
                 let score = scores.get(*task, helper)?;
                 let dot = published(helper).and_then(|row| Some(row.scores(*task)?.tr));
-                Some(Bar { mean: score.tr, interval: shown_interval(score), dot })
+                Some(Bar { mean: score.tr, interval: drawn_interval(score), dot })
             };
             let helper_title = part.labels().title(helper);
             HelperBars { helper: helper_title, values: tasks.iter().map(bar).collect() }

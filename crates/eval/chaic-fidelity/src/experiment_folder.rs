@@ -135,6 +135,17 @@ impl ExperimentFolder {
         self.path.join(&part.name)
     }
 
+    /// Returns whether a run exists. Its copies of the episodes make `--episodes` optional.
+    pub fn has_run(&self) -> bool {
+        self.first_run().is_some()
+    }
+
+    /// Returns the folder of the first part that is a run.
+    fn first_run(&self) -> Option<PathBuf> {
+        let mut folders = self.plan.parts().into_iter().map(|part| self.folder(&part));
+        folders.find(|folder| RunFolder::is_run(folder))
+    }
+
     /// Returns the episodes of a part. A resumed run compares those of the option with its copies. A new
     /// run has those that the first run copied, so that all runs use the same; before it, those of the option.
     fn episodes(&self, part: &ExperimentPart) -> Result<PathBuf> {
@@ -143,8 +154,7 @@ impl ExperimentFolder {
         {
             return Ok(given.clone());
         }
-        let mut runs = self.plan.parts().into_iter().map(|p| self.folder(&p));
-        let copies = runs.find(|run| RunFolder::is_run(run)).map(|r| r.join("episodes"));
+        let copies = self.first_run().map(|run| run.join("episodes"));
         copies.or_else(|| self.episodes.clone()).ok_or_else(|| {
             let text = "no run has started yet; give the folder with episode files by --episodes";
             EvalError::Options(text.to_owned())

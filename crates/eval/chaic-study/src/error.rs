@@ -20,8 +20,13 @@ pub enum StudyError {
         problem: String,
     },
     /// An episode of the study does not exist.
-    #[error(transparent)]
-    Episode(#[from] SplitError),
+    #[error("{path}: {problem}", path = path.display())]
+    Episode {
+        /// The file that names the episode.
+        path: PathBuf,
+        /// Id and expectation.
+        problem: SplitError,
+    },
     /// The file of a participant has a problem.
     #[error("{path}, line {line}: {problem}", path = path.display())]
     Data {
@@ -46,7 +51,10 @@ pub enum StudyError {
 impl StudyError {
     /// Returns whether the caller's request caused the error.
     pub fn is_usage(&self) -> bool {
-        matches!(self, StudyError::Code(_))
+        matches!(
+            self,
+            StudyError::Definition { .. } | StudyError::Episode { .. } | StudyError::Code(_)
+        )
     }
 }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use chaic_core::FRAMES_PER_SECOND;
 use chaic_env::RunKey;
-use chaic_episodes::{Episode, find_episode};
+use chaic_episodes::{Episode, SplitError, find_episode};
 use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 
@@ -31,6 +31,8 @@ const SHORT_DIGITS: usize = 8;
 
 /// Problem with the keys of `study.toml`.
 type Problem = String;
+/// Result of looking episodes up.
+type Found<T> = std::result::Result<T, SplitError>;
 
 /// A combination of factor levels.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -81,6 +83,7 @@ impl StudyPlan {
     pub fn new(study: Study, path: &std::path::Path) -> Result<StudyPlan> {
         let wrong =
             |problem: Problem| crate::StudyError::Definition { path: path.to_owned(), problem };
+        let no_episode = |problem| crate::StudyError::Episode { path: path.to_owned(), problem };
         let mut conditions = conditions(&study);
         let max = match study.design {
             Design::LatinSquare => MAX_WITHIN,
@@ -92,14 +95,14 @@ impl StudyPlan {
                 conditions.len()
             )));
         }
-        if let Some(id) = repeated_house(&study)? {
+        if let Some(id) = repeated_house(&study).map_err(no_episode)? {
             return Err(wrong(format!("`practice` and `episodes` have the house of `{id}` twice")));
         }
         let mut pool = EpisodePool::default();
         let practice = study.practice.iter().map(|id| pool.add(id.clone()));
-        let practice = practice.collect::<Result<Vec<usize>>>()?;
+        let practice = practice.collect::<Found<Vec<usize>>>().map_err(no_episode)?;
         for condition in &mut conditions {
-            condition.episodes = pool.of_condition(&study, condition)?;
+            condition.episodes = pool.of_condition(&study, condition).map_err(no_episode)?;
             if pool.episodes.len() > MAX_RESOLVED {
                 let text = "`episodes` and `factors.person` give more than";
                 return Err(wrong(format!("{text} {MAX_RESOLVED} different episodes")));
@@ -240,7 +243,7 @@ impl StudyPlan {
 }
 
 /// Returns the first listed episode that has the house of an earlier one.
-fn repeated_house(study: &Study) -> Result<Option<String>> {
+fn repeated_house(study: &Study) -> Found<Option<String>> {
     let mut houses = BTreeSet::new();
     for id in study.practice.iter().chain(&study.episodes) {
         let episode = find_episode(id)?;
@@ -261,7 +264,7 @@ struct EpisodePool {
 
 impl EpisodePool {
     /// Returns the index of the episode with an id.
-    fn add(&mut self, id: String) -> Result<usize> {
+    fn add(&mut self, id: String) -> Found<usize> {
         if let Some(found) = self.episodes.iter().position(|episode| episode.id() == id) {
             return Ok(found);
         }
@@ -275,7 +278,7 @@ impl EpisodePool {
     }
 
     /// Returns the indices of the episodes of a condition.
-    fn of_condition(&mut self, study: &Study, condition: &Condition) -> Result<Vec<usize>> {
+    fn of_condition(&mut self, study: &Study, condition: &Condition) -> Found<Vec<usize>> {
         let person = condition.levels.iter().find(|(factor, _)| *factor == "person");
         let suffix = person.map_or(String::new(), |(_, level)| format!("/{level}"));
         let listed = listed(study, condition).into_iter();

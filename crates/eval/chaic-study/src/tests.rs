@@ -71,7 +71,11 @@ fn errors_name_the_key_and_the_expectation() {
             "high_target/test/01/+tremor",
             "the house of `high_target/test/01/",
         ),
-        ("high_target/test/02", "high_target/test/99", "high_target/test/99"),
+        (
+            "high_target/test/02",
+            "high_target/test/99",
+            "study.toml: no episode `high_target/test/99`",
+        ),
         ("\"infer\"]", "\"deep\"]", "`helper` names `deep`; expected one of none, random"),
         (
             "\"infer\"]\n",
@@ -89,9 +93,12 @@ fn errors_name_the_key_and_the_expectation() {
         let changed = SMALL.replace(old, new);
         assert_ne!(changed, SMALL, "{old}");
         let (_dir, path) = folder_with(&changed);
-        let message = plan_of(&path).expect_err(new).to_string();
+        let error = plan_of(&path).expect_err(new);
+        let message = error.to_string();
         assert!(message.contains(words), "{new}: {message}");
         assert!(!message.contains('\n'), "{message}");
+        // A text that is missing is no invalid request.
+        assert_eq!(error.is_usage(), !new.contains("absent.txt"), "{message}");
     }
     let (dir, path) = folder_with(SMALL);
     fs::write(dir.path().join("consent.txt"), "x".repeat(70_000)).expect("the disk has space");

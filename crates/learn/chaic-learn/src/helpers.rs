@@ -15,24 +15,22 @@ use chaic_nn::weights::WeightsError;
 use crate::bundled::{BundledHelper, BundledPartner};
 use crate::loaded_policy::LoadedPolicy;
 use crate::partner::policy::PartnerWeights;
-use crate::visual::helper::{VisualPolicies, VisualWeights};
+use crate::visual::helper::{EXTENSION, VisualPolicies, VisualWeights};
 
 /// Maximum size of a weights file, bytes.
 const MAX_BYTES: u64 = 1 << 28;
-/// Extension of weights files.
-const EXTENSION: &str = "safetensors";
 
 /// Policy with a helper name.
 pub struct NamedPolicy {
     name: String,
+    /// Weights file, or folder with one per task.
+    path: PathBuf,
     policy: LoadedPolicy,
 }
 
 /// Reason why a policy cannot be a helper.
 #[derive(Debug, thiserror::Error)]
 enum PolicyError {
-    #[error("{0}")]
-    Name(String),
     #[error(transparent)]
     File(#[from] FileError),
     #[error("{}: {problem}", path.display())]
@@ -68,7 +66,7 @@ impl NamedPolicy {
             let weights_error = |problem| PolicyError::Weights { path: path.to_owned(), problem };
             LoadedPolicy::from_bytes(&bytes).map_err(weights_error)?
         };
-        Ok(NamedPolicy { name: name.to_owned(), policy })
+        Ok(NamedPolicy { name: name.to_owned(), path: path.to_owned(), policy })
     }
 }
 
@@ -149,14 +147,19 @@ impl<'a> PolicyRegistry<'a> {
     ) -> chaic_env::Result<PolicyRegistry<'a>> {
         let mut taken = self.names();
         for NamedPolicy { name, .. } in &policies {
-            check_new_name(name, &taken, "mine=policy:FILE").map_err(PolicyError::Name)?;
+            check_new_name(name, &taken, "mine=policy:FILE")
+                .map_err(|problem| EnvError::HelperName { problem })?;
             taken.push(name.clone());
         }
         Ok(PolicyRegistry { policies, ..self })
     }
 
+    fn given(&self, name: &str) -> Option<&NamedPolicy> {
+        self.policies.iter().find(|p| p.name == name)
+    }
+
     fn policy(&self, name: &str) -> Option<&LoadedPolicy> {
-        let given = self.policies.iter().find(|p| p.name == name).map(|p| &p.policy);
+        let given = self.given(name).map(|p| &p.policy);
         given.or_else(|| BundledHelper::find(name).map(BundledHelper::policy))
     }
 }
@@ -179,6 +182,18 @@ impl HelperRegistry for PolicyRegistry<'_> {
         match self.policy(&key.helper) {
             Some(policy) => Some(policy.helper(rules, &*self.perception)),
             None => self.fallback.make_for(key, rules),
+        }
+    }
+
+    fn check_task(&self, name: &str, task: TaskId) -> Result<(), String> {
+        match self.given(name) {
+            Some(given) if !given.policy.plays(task) => Err(format!(
+                "{} has no {task}.{EXTENSION}, so `{name}` can't play {task}; add the file, or select \
+                 other tasks",
+                given.path.display()
+            )),
+            Some(_) => Ok(()),
+            None => self.fallback.check_task(name, task),
         }
     }
 

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use chaic_agents::PlannerRules;
 use chaic_agents::perception_factory::PerceptionFactory;
+use chaic_core::TaskId;
 use chaic_env::helper_registry::Helper;
 use chaic_nn::weights::{self, WeightsError};
 
@@ -28,6 +29,14 @@ impl LoadedPolicy {
             return Ok(LoadedPolicy::Visual(Arc::new(VisualPolicies::AllTasks(Arc::new(weights)))));
         }
         Ok(LoadedPolicy::Plans(Arc::new(PolicyWeights::from_bytes(bytes)?)))
+    }
+
+    /// Returns whether the policy can play a task.
+    pub(crate) fn plays(&self, task: TaskId) -> bool {
+        match self {
+            LoadedPolicy::Plans(_) => true,
+            LoadedPolicy::Visual(policies) => policies.plays(task),
+        }
     }
 
     /// Creates a helper with this policy.

@@ -14,7 +14,7 @@ use chaic_env::{Appearance, RewardWeights};
 use chaic_episodes::{SeedRange, find_episode};
 use chaic_files::read_user_file;
 use chaic_training::bounds::{Bound, BoundTable, integer, real};
-use chaic_training::{Metrics, TrainingError, metrics};
+use chaic_training::{Metrics, TrainingError, defined_metrics, metrics};
 use chaic_vision::perception_registry::{self, PerceptionError};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -328,7 +328,7 @@ impl Validation<'_> {
     }
 
     /// Returns the mean transport rate of the baseline, and the mean difference of these rates from it with
-    /// its standard error; `None` if `stop` is raised.
+    /// its standard error, if there are two episodes; `None` if `stop` is raised.
     pub fn compare(
         &self,
         rates: &[f64],
@@ -348,16 +348,21 @@ impl Validation<'_> {
             let _ = self.baseline.set(rates?);
         }
         let baseline = self.baseline.get().expect("it was set above");
-        let gains: Vec<f64> = rates.iter().zip(baseline).map(|(a, b)| a - b).collect();
-        let gain = mean(&gains);
-        let variance = gains.iter().map(|x| (x - gain) * (x - gain)).sum::<f64>()
-            / (gains.len().max(2) - 1) as f64;
-        Some(metrics([
-            ("tr_baseline", mean(baseline)),
-            ("gain", gain),
-            ("gain_se", (variance / gains.len().max(1) as f64).sqrt()),
-        ]))
+        Some(gain_metrics(rates, baseline))
     }
+}
+
+/// Returns the metrics of [`Validation::compare`]. One episode has no standard error.
+fn gain_metrics(rates: &[f64], baseline: &[f64]) -> Metrics {
+    let gains: Vec<f64> = rates.iter().zip(baseline).map(|(a, b)| a - b).collect();
+    let (gain, n) = (mean(&gains), gains.len() as f64);
+    let squares: f64 = gains.iter().map(|x| (x - gain) * (x - gain)).sum();
+    let standard_error = (n > 1.0).then(|| (squares / (n - 1.0) / n).sqrt());
+    defined_metrics([
+        ("tr_baseline", Some(mean(baseline))),
+        ("gain", Some(gain)),
+        ("gain_se", standard_error),
+    ])
 }
 
 pub(crate) fn mean(values: &[f64]) -> f64 {
@@ -378,6 +383,16 @@ mod tests {
         let ids = |n, stop| validation_ids(TaskId::LowTarget, "gen", n, &AtomicBool::new(stop));
         assert_eq!(ids(2, false).map(|ids| ids.len()), Some(2));
         assert_eq!(ids(2, true), None);
+    }
+
+    #[test]
+    fn one_episode_has_no_standard_error() {
+        let one = gain_metrics(&[0.5], &[0.25]);
+        assert_eq!(one, metrics([("tr_baseline", 0.25), ("gain", 0.25)]));
+        // Gains of 0.25 and 0.75 have a standard deviation of √(1/8).
+        let two = gain_metrics(&[0.5, 1.0], &[0.25, 0.25]);
+        let expected = metrics([("tr_baseline", 0.25), ("gain", 0.5), ("gain_se", 0.25)]);
+        assert_eq!(two, expected);
     }
 
     #[test]

@@ -1,4 +1,7 @@
-//! Elementwise operations, compiled for the widest vectors, and nearest-neighbor upsampling.
+//! Elementwise operations, compiled for the widest vectors, and copies of rows: nearest-neighbor
+//! upsampling and neighbors in sequences.
+
+use std::ops::Range;
 
 use crate::tensor::{Shape, Tensor};
 
@@ -100,4 +103,48 @@ pub(crate) fn downsample(gradient: &Tensor, out: &mut Tensor) {
             }
         }
     }
+}
+
+/// Concatenates the channels of the previous, the same and the next row of sequences of `length` rows;
+/// zeros stand for rows outside of a sequence.
+///
+/// # Panics
+/// If the rows are not whole sequences.
+pub(crate) fn concat_neighbors(rows: &Tensor, length: usize, out: &mut [f32]) {
+    let channels = rows.shape.channels;
+    assert!(rows.shape.pixels().is_multiple_of(length), "rows are not sequences of {length}");
+    out.fill(0.0);
+    let sequences = rows.data.chunks_exact(length * channels);
+    for (sequence, out) in sequences.zip(out.chunks_exact_mut(3 * length * channels)) {
+        for (from, to) in neighbor_ranges(length, channels) {
+            out[to].copy_from_slice(&sequence[from]);
+        }
+    }
+}
+
+/// Adds the gradient of the rows of [`concat_neighbors`], given the gradient of its output.
+pub(crate) fn add_neighbor_gradients(gradient: &[f32], length: usize, rows: &mut Tensor) {
+    let channels = rows.shape.channels;
+    let sequences = rows.data.chunks_exact_mut(length * channels);
+    for (sequence, gradient) in sequences.zip(gradient.chunks_exact(3 * length * channels)) {
+        for (from, to) in neighbor_ranges(length, channels) {
+            sequence[from].iter_mut().zip(&gradient[to]).for_each(|(sum, g)| *sum += g);
+        }
+    }
+}
+
+/// Returns, for each row of a sequence, its range and each range of the output of
+/// [`concat_neighbors`] that holds a copy of it.
+fn neighbor_ranges(
+    length: usize,
+    channels: usize,
+) -> impl Iterator<Item = (Range<usize>, Range<usize>)> {
+    let range = move |k: usize| k * channels..(k + 1) * channels;
+    (0..length).flat_map(move |row| {
+        // The row is the next one of the row before, and the previous one of the row after.
+        let next_of = row.checked_sub(1).map(|before| 3 * before + 2);
+        let previous_of = Some(3 * (row + 1)).filter(|_| row + 1 < length);
+        let copies = [next_of, Some(3 * row + 1), previous_of].into_iter().flatten();
+        copies.map(move |copy| (range(row), range(copy)))
+    })
 }

@@ -39,7 +39,13 @@ impl Inference {
     /// [`Pass`](crate::Pass) supports, or the number of parameters differs.
     pub fn new(network: &Network, parameters: &[f32], arch: Arch) -> Inference {
         let is_unsupported = |layer: &Layer| {
-            matches!(layer, Layer::Reshape { .. } | Layer::Concat { .. } | Layer::Attention { .. })
+            matches!(
+                layer,
+                Layer::Reshape { .. }
+                    | Layer::Concat { .. }
+                    | Layer::Neighbors { .. }
+                    | Layer::Attention { .. }
+            )
         };
         let has_unsupported = network.layers.iter().any(is_unsupported);
         assert!(!has_unsupported, "inference supports no reshapes, concatenations and attention");
@@ -161,7 +167,10 @@ impl Inference {
                 let map = &earlier[from.0].data[rows.start * width * channels..];
                 upsample(&map[..rows.len() * width * channels], width, channels, out);
             }
-            Layer::Reshape { .. } | Layer::Concat { .. } | Layer::Attention { .. } => {
+            Layer::Reshape { .. }
+            | Layer::Concat { .. }
+            | Layer::Neighbors { .. }
+            | Layer::Attention { .. } => {
                 unreachable!("the constructor refuses such networks")
             }
         }
@@ -197,7 +206,8 @@ fn segments(network: &Network) -> (Vec<Range<usize>>, Vec<bool>) {
             Layer::Conv { from, .. }
             | Layer::Depthwise { from, .. }
             | Layer::Upsample { from }
-            | Layer::Reshape { from } => {
+            | Layer::Reshape { from }
+            | Layer::Neighbors { from, .. } => {
                 is_kept[from.0] = true;
             }
         }

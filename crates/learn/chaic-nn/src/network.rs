@@ -45,6 +45,8 @@ pub(crate) enum Layer {
     Reshape { from: Node },
     /// Concatenation of the channels of two maps.
     Concat { a: Node, b: Node },
+    /// Concatenation of the channels of the previous, the same and the next row of a sequence.
+    Neighbors { from: Node, length: usize },
     /// Multi-head attention between the rows of a group.
     Attention { query: Node, key: Node, value: Node, n_heads: usize },
 }
@@ -59,7 +61,8 @@ impl Layer {
             | Layer::Norm { from, .. }
             | Layer::Relu { from }
             | Layer::Upsample { from }
-            | Layer::Reshape { from } => (Some(from), None, None),
+            | Layer::Reshape { from }
+            | Layer::Neighbors { from, .. } => (Some(from), None, None),
             Layer::Add { a, b } | Layer::Concat { a, b } => (Some(a), Some(b), None),
             Layer::Attention { query, key, value, .. } => (Some(query), Some(key), Some(value)),
         };
@@ -241,6 +244,15 @@ impl Network {
     pub fn concat_pairs(&mut self, from: Node) -> Node {
         let Size { channels, stride, maps } = self.sizes[from.0];
         self.push(Layer::Reshape { from }, Size { channels: 2 * channels, stride, maps: 2 * maps })
+    }
+
+    /// Adds the concatenation of the channels of the previous, the same and the next row; the first
+    /// and last row have zeros for the missing one. Rows are maps of one pixel; `length` consecutive
+    /// ones are a sequence. With a pointwise convolution it is a convolution of size 3 over time.
+    pub fn concat_neighbors(&mut self, from: Node, length: usize) -> Node {
+        let size = self.sizes[from.0];
+        let channels = 3 * size.channels;
+        self.push(Layer::Neighbors { from, length }, Size { channels, ..size })
     }
 
     /// Returns the shapes of all inputs, given that of the first.

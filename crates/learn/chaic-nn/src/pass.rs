@@ -8,7 +8,9 @@ use pulp::Arch;
 use crate::attention::{Attention, AttentionGrad};
 use crate::conv::{self, Im2colBuffers};
 use crate::depthwise::{self, Padded, Zeros};
-use crate::elementwise::{AddTo, Relu, ReluGrad, Sum, downsample, upsample};
+use crate::elementwise::{
+    AddTo, Relu, ReluGrad, Sum, add_neighbor_gradients, concat_neighbors, downsample, upsample,
+};
 use crate::gemm::PackedMatrix;
 use crate::inference::pack_weights;
 use crate::network::{Layer, Network, Node};
@@ -214,6 +216,9 @@ impl Pass {
                         to_b.copy_from_slice(b);
                     }
                 }
+                Layer::Neighbors { from, length } => {
+                    concat_neighbors(&earlier[from.0], length, &mut out.data);
+                }
                 Layer::Attention { query, key, value, n_heads } => {
                     let rows = [out.shape.pixels()];
                     let groups = if self.groups.is_empty() { &rows } else { &self.groups[..] };
@@ -339,6 +344,9 @@ impl Pass {
                             to.iter_mut().zip(&pixel[range.clone()]).for_each(|(to, g)| *to += g);
                         }
                     }
+                }
+                Layer::Neighbors { from, length } => {
+                    add_neighbor_gradients(&gradient.data, length, &mut earlier[from.0]);
                 }
                 Layer::Attention { query, key, value, n_heads } => {
                     let rows = [gradient.shape.pixels()];

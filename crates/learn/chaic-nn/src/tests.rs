@@ -71,6 +71,19 @@ fn network_with_attention() -> (Network, Node) {
     (net, head)
 }
 
+/// Creates a network whose rows read their neighbors in sequences of three.
+fn network_with_sequences() -> (Network, Node) {
+    let mut net = Network::default();
+    let input = net.input(3);
+    let embedding = net.conv("embedding", input, Kernel::POINTWISE, 16);
+    let norm = net.norm("embedding.norm", embedding);
+    let neighbors = net.concat_neighbors(norm, 3);
+    let dense = net.conv("dense", neighbors, Kernel::POINTWISE, 16);
+    let last = net.norm_relu("last.norm", dense);
+    let head = net.output_head("head", last, 5);
+    (net, head)
+}
+
 const ROWS: Shape = Shape { n: 6, height: 1, width: 1, channels: 3 };
 const SMALL: Shape = Shape { n: 4, height: 8, width: 8, channels: 3 };
 
@@ -120,6 +133,7 @@ fn gradients_agree_with_finite_differences() {
     check_gradients(&network_with_reshapes(), SMALL);
     check_gradients(&network_with_inputs(), SMALL);
     check_gradients(&network_with_attention(), ROWS);
+    check_gradients(&network_with_sequences(), ROWS);
 }
 
 fn check_gradients(network: &(Network, Node), shape: Shape) {
@@ -157,6 +171,7 @@ fn passes_are_bit_identical_at_every_width() {
         (network_with_reshapes(), SMALL),
         (network_with_inputs(), SMALL),
         (network_with_attention(), ROWS),
+        (network_with_sequences(), ROWS),
     ] {
         let parameters = network.0.init_parameters(3);
         let expected = gradient(&network, input, &parameters, widest());
@@ -173,6 +188,7 @@ fn passes_with_constant_parameters_are_bit_identical() {
         (network_with_reshapes(), SMALL),
         (network_with_inputs(), SMALL),
         (network_with_attention(), ROWS),
+        (network_with_sequences(), ROWS),
     ] {
         let parameters = net.init_parameters(3);
         let inputs = inputs(&net, first);
@@ -211,6 +227,26 @@ fn maps_that_run_alone_after_any_node_are_bit_identical_to_those_of_the_batch() 
             }
         }
     }
+}
+
+#[test]
+fn rows_read_their_neighbors_in_their_own_sequence_only() {
+    let mut net = Network::default();
+    let input = net.input(1);
+    let neighbors = net.concat_neighbors(input, 3);
+    let shape = Shape { n: 6, height: 1, width: 1, channels: 1 };
+    let rows = Tensor { shape, data: vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0] };
+    let mut pass = Pass::new(&net, widest());
+    pass.forward(&net, &[], &rows);
+    let expected = [
+        [0.0, 1.0, 2.0],
+        [1.0, 2.0, 3.0],
+        [2.0, 3.0, 0.0],
+        [0.0, 4.0, 5.0],
+        [4.0, 5.0, 6.0],
+        [5.0, 6.0, 0.0],
+    ];
+    assert_eq!(pass.activation(neighbors).data, expected.concat());
 }
 
 /// The brightness level (one of five) of each pixel can be learned in a few steps.

@@ -44,8 +44,14 @@ pub fn read_config_with<T: Trainer>(
     let mut table = Table::try_from(config).expect("a configuration serializes to TOML");
     for assignment in assignments {
         let invalid =
-            |problem| TrainingError::InvalidConfig(format!("--set {assignment}: {problem}"));
-        table = assign::<T>(&table, parse_assignment(assignment).map_err(invalid)?);
+            |problem: &str| TrainingError::InvalidConfig(format!("--set {assignment}: {problem}"));
+        let assigned = parse_assignment(assignment).map_err(|problem| invalid(&problem))?;
+        table = assign::<T>(&table, assigned);
+        if let Err(problem) = parse::<T::Config>(&table.to_string()) {
+            // Bounds name the key as well.
+            bounds::check(&table, T::BOUNDS).map_err(TrainingError::InvalidConfig)?;
+            return Err(invalid(without_line(&problem)));
+        }
     }
     let config = parse_config::<T>(&table.to_string());
     config.map_err(|problem| TrainingError::InvalidConfig(without_line(&problem).to_owned()))

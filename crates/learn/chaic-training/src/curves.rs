@@ -77,6 +77,11 @@ pub fn metrics<const N: usize>(named: [(&str, f64); N]) -> Metrics {
     named.into_iter().map(|(name, x)| (name.to_owned(), x)).collect()
 }
 
+/// Returns metrics from pairs of name and value, without the undefined ones.
+pub fn defined_metrics<const N: usize>(named: [(&str, Option<f64>); N]) -> Metrics {
+    named.into_iter().filter_map(|(name, x)| Some((name.to_owned(), x?))).collect()
+}
+
 /// Returns the mean of each metric over the steps that have it.
 pub(crate) fn mean(steps: &[Metrics]) -> Metrics {
     let n_steps = |name: &str| steps.iter().filter(|step| step.contains_key(name)).count();

@@ -24,7 +24,7 @@ pub mod trainer;
 
 pub use checkpoint::{Checkpoint, CheckpointError};
 pub use config::{parse_config, read_config, read_config_with};
-pub use curves::{CURVES, CurveRecord, Metrics, Phase, metrics};
+pub use curves::{CURVES, CurveRecord, Metrics, Phase, defined_metrics, metrics};
 pub use learner::{Learner, learning_rate_at};
 pub use run::{CHECKPOINT, CONFIG, INITIAL_WEIGHTS, TrainingRun};
 pub use trainer::{Trainer, TrainingError};

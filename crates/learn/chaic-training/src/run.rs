@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use chaic_files::{
-    FolderLock, LOCK, TEMPORARY_SUFFIX, create_folders, entries, read_bounded, read_user_file,
-    remove_empty_folder, remove_file, write_atomically,
+    EntryKind, FolderLock, LOCK, TEMPORARY_SUFFIX, create_folders, entries, kind, read_bounded,
+    read_user_file, remove_empty_folder, remove_file, remove_folder, write_atomically,
 };
+use chaic_nn::Network;
 use chaic_nn::weights::WeightsError;
 
 use crate::checkpoint::{Checkpoint, CheckpointError, Identity, Section};
@@ -192,7 +193,7 @@ impl<T: Trainer> TrainingRun<T> {
         check_is_empty(folder)?;
         let started = start_locked::<T>(folder, config, weights, progress, stop);
         if started.is_err() {
-            remove_training(folder, is_new);
+            remove_training(folder, T::DATA, is_new);
         }
         Ok(started?.map(|trainer| TrainingRun {
             folder: folder.to_owned(),
@@ -207,15 +208,20 @@ impl<T: Trainer> TrainingRun<T> {
     /// Resumes a training; `None` if it was stopped before it was ready.
     ///
     /// # Errors
-    /// If files cannot be read, are damaged or belong to another training, the training data has
-    /// changed, or the folder is in use.
+    /// If the folder holds no training, files cannot be read, are damaged or belong to another
+    /// training, the training data has changed, or the folder is in use.
     pub fn resume(
         folder: &Path,
         progress: &mut dyn FnMut(&str),
         stop: &AtomicBool,
     ) -> Result<Option<TrainingRun<T>>, TrainingError> {
         // A folder without a configuration gets no lock file.
-        let config = read_written_config::<T>(&folder.join(CONFIG))?;
+        let path = folder.join(CONFIG);
+        if kind(&path)? == EntryKind::Missing {
+            return Err(TrainingError::NoTraining(folder.to_owned()));
+        }
+        let config = read_written_config::<T>(&path)
+            .map_err(|error| other_kind::<T>(folder).unwrap_or(error))?;
         let lock = FolderLock::acquire(folder)?;
         let path = folder.join(CHECKPOINT);
         // No checkpoint: the training was stopped before its first step. A dangling link counts as
@@ -440,12 +446,28 @@ fn check_is_empty(folder: &Path) -> Result<(), TrainingError> {
     }
 }
 
-/// Removes the files that make a folder a training, after its start failed. A new folder is removed
-/// too if it is then empty.
-fn remove_training(folder: &Path, is_new: bool) {
+/// Returns the error about a folder whose checkpoint is of another kind of training; `None` if it is
+/// of this kind or cannot be read.
+fn other_kind<T: Trainer>(folder: &Path) -> Option<TrainingError> {
+    let bytes = read_bounded(&folder.join(CHECKPOINT), MAX_BYTES).ok()?;
+    // The kind is compared before the network, which is unknown without a configuration.
+    let identity = Identity::new(T::KIND, &Network::default());
+    match Checkpoint::from_bytes(&bytes, &identity) {
+        Err(CheckpointError::Kind { found, expected }) => {
+            Some(TrainingError::OtherKind { path: folder.to_owned(), found, expected })
+        }
+        _ => None,
+    }
+}
+
+/// Removes the files that make a folder a training, and its collected data, after its start failed. A
+/// new folder is removed too if it is then empty.
+fn remove_training(folder: &Path, data: &[&str], is_new: bool) {
     // The original failure is reported; files that cannot be removed stay.
-    for name in [CONFIG, INITIAL_WEIGHTS, CHECKPOINT] {
-        let _ = remove_file(&folder.join(name));
+    for name in [CONFIG, INITIAL_WEIGHTS, CHECKPOINT].iter().chain(data) {
+        let path = folder.join(name);
+        let is_folder = kind(&path).is_ok_and(|kind| kind == EntryKind::Folder);
+        let _ = if is_folder { remove_folder(&path) } else { remove_file(&path) };
     }
     if is_new {
         let _ = remove_file(&folder.join(LOCK));

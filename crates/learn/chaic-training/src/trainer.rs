@@ -38,6 +38,9 @@ pub trait Trainer: Sized {
     const SCORE: Option<&'static str> = None;
     /// Key of the configuration that names the data of [`Trainer::input_digest`]; empty if there is none.
     const INPUT_KEY: &'static str = "";
+    /// Names of files and folders in the folder of the training that [`Trainer::new`] writes. A failed
+    /// start removes them.
+    const DATA: &'static [&'static str] = &[];
 
     /// Prepares the training for its first step; `None` if it was stopped.
     ///
@@ -123,6 +126,19 @@ pub enum TrainingError {
     /// The output folder has content.
     #[error("{0} isn't empty; continue it with --resume or choose another --out")]
     NotEmpty(PathBuf),
+    /// The folder to resume from has no configuration.
+    #[error("{0} holds no training; leave out --resume to start one")]
+    NoTraining(PathBuf),
+    /// The folder to resume from belongs to another kind of training.
+    #[error("{path} holds a training of `chaic train {found}`, not of `chaic train {expected}`")]
+    OtherKind {
+        /// The folder.
+        path: PathBuf,
+        /// Kind of its training.
+        found: String,
+        /// Kind of this training.
+        expected: String,
+    },
     /// A configuration file is invalid.
     #[error("{path}: {problem}")]
     Config {

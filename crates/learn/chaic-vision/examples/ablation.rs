@@ -71,7 +71,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("{n_views} views, mAP@50 and mAP of instances of at least {MIN_AREA_PX} pixels");
     for (variant, images) in VARIANTS.iter().zip(&images) {
         let found = average_precision(images, &(MIN_AREA_PX..=u32::MAX));
-        println!("{variant:52} {:.3} {:.3}", found.map50, found.map);
+        let number = |x: Option<f64>| x.map_or_else(|| "/".to_owned(), |x| format!("{x:.3}"));
+        println!("{variant:52} {:>5} {:>5}", number(found.map50), number(found.map));
     }
     Ok(())
 }

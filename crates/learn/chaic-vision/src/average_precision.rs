@@ -124,10 +124,10 @@ fn match_detections(
 /// Average precision of a detector.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AveragePrecision {
-    /// Mean over classes at IoU 0.5.
-    pub map50: f64,
-    /// Mean over classes and [`IOU_THRESHOLDS`].
-    pub map: f64,
+    /// Mean over classes at IoU 0.5; `None` without evaluated instances.
+    pub map50: Option<f64>,
+    /// Mean over classes and [`IOU_THRESHOLDS`]; `None` without evaluated instances.
+    pub map: Option<f64>,
     /// By label: average precision at IoU 0.5, mean over all thresholds, and the number of
     /// evaluated instances.
     pub classes: BTreeMap<u8, (f64, f64, usize)>,
@@ -145,10 +145,14 @@ pub fn average_precision(images: &[EvaluatedImage], areas: &AreaRange) -> Averag
         (label, (all[0], all.iter().sum::<f64>() / all.len() as f64, n))
     };
     let classes: BTreeMap<u8, (f64, f64, usize)> = n_evaluated.into_iter().map(evaluate).collect();
-    let mean = |of: fn(&(f64, f64, usize)) -> f64| {
-        classes.values().map(of).sum::<f64>() / classes.len().max(1) as f64
-    };
-    AveragePrecision { map50: mean(|c| c.0), map: mean(|c| c.1), classes }
+    let of_classes = |of: fn(&(f64, f64, usize)) -> f64| mean(classes.values().map(of));
+    AveragePrecision { map50: of_classes(|c| c.0), map: of_classes(|c| c.1), classes }
+}
+
+/// Returns the mean of values; `None` if there are none.
+pub(crate) fn mean(values: impl ExactSizeIterator<Item = f64>) -> Option<f64> {
+    let n = values.len();
+    (n > 0).then(|| values.sum::<f64>() / n as f64)
 }
 
 #[cfg(test)]
@@ -171,9 +175,9 @@ mod tests {
         let found = vec![detection(1, 0.9, 100, &[100, 0]), detection(2, 0.4, 50, &[0, 50])];
         let image = EvaluatedImage { truths: truths.clone(), detections: found };
         let perfect = average_precision(&[image], &ALL);
-        assert_eq!((perfect.map50, perfect.map), (1.0, 1.0));
+        assert_eq!((perfect.map50, perfect.map), (Some(1.0), Some(1.0)));
         let blind = average_precision(&[EvaluatedImage { truths, detections: Vec::new() }], &ALL);
-        assert_eq!((blind.map50, blind.map), (0.0, 0.0));
+        assert_eq!((blind.map50, blind.map), (Some(0.0), Some(0.0)));
     }
 
     /// Detections are correct, wrong, correct among three instances: precision is 1 up to recall
@@ -188,7 +192,7 @@ mod tests {
         let image = EvaluatedImage { truths: vec![truth(1, 100); 3], detections };
         let expected = (34.0 + 33.0 * 2.0 / 3.0) / 101.0;
         let found = average_precision(std::slice::from_ref(&image), &ALL);
-        assert!((found.map50 - expected).abs() < 1e-12, "{found:?}");
+        assert!((found.map50.unwrap() - expected).abs() < 1e-12, "{found:?}");
         // 80 shared pixels of 120 in the union: IoU 2/3.
         assert!(class_precision(&[image], 1, 0.7, &ALL).unwrap() < expected);
     }
@@ -203,10 +207,13 @@ mod tests {
                 detection(1, 0.5, 100, &[100, 0]),
             ],
         };
-        assert_eq!(average_precision(std::slice::from_ref(&image), &(50..=u32::MAX)).map50, 1.0);
-        let with_small = average_precision(std::slice::from_ref(&image), &ALL).map50;
+        let large = average_precision(std::slice::from_ref(&image), &(50..=u32::MAX));
+        assert_eq!(large.map50, Some(1.0));
+        let with_small = average_precision(std::slice::from_ref(&image), &ALL).map50.unwrap();
         assert!(with_small < 0.9, "one of three is wrong: {with_small}");
-        // No instance is that large.
-        assert_eq!(average_precision(&[image], &(500..=u32::MAX)).classes.len(), 0);
+        // No instance is that large, so the mean is undefined.
+        let none = average_precision(&[image], &(500..=u32::MAX));
+        assert_eq!(none, AveragePrecision::default());
+        assert_eq!((none.map50, none.map), (None, None));
     }
 }

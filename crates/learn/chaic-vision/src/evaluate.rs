@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::average_precision::{
     AreaRange, AveragePrecision, EvaluatedImage, GroundTruthInstance, ScoredDetection,
-    average_precision,
+    average_precision, mean,
 };
 use crate::calibration::{Calibration, CalibrationSample, calibration_error, predictors};
 use crate::error_breakdown::ErrorBreakdown;
@@ -133,24 +133,25 @@ fn map_views<T: Send>(
     )
 }
 
-/// Accuracy of a detector, serialized as JSON.
+/// Accuracy of a detector, serialized as JSON. Values that no instance or detection defines are
+/// `None`.
 #[derive(Clone, Debug, Serialize)]
 pub struct DetectionReport {
     /// Number of evaluated views.
     pub views: usize,
     /// Mean average precision at IoU 0.5, for instances of [`MIN_AREA_PX`] pixels and more.
-    pub map50: f64,
+    pub map50: Option<f64>,
     /// Mean average precision over IoU 0.5 to 0.95.
-    pub map: f64,
+    pub map: Option<f64>,
     /// Both values with smaller instances included, by minimum area in pixels.
-    pub smaller: BTreeMap<u32, [f64; 2]>,
+    pub smaller: BTreeMap<u32, [Option<f64>; 2]>,
     /// Both values by size range.
-    pub sizes: BTreeMap<&'static str, [f64; 2]>,
+    pub sizes: BTreeMap<&'static str, [Option<f64>; 2]>,
     /// `map50` over the classes with at least [`MIN_FREQUENT_INSTANCES`] instances, and the number
     /// of these classes.
-    pub map50_of_frequent: (f64, usize),
+    pub map50_of_frequent: (Option<f64>, usize),
     /// Expected calibration error of scores.
-    pub calibration_error: f64,
+    pub calibration_error: Option<f64>,
     /// Errors by cause.
     #[serde(rename = "failures")]
     pub errors: ErrorBreakdown,
@@ -202,14 +203,15 @@ pub fn report<A: Send>(
     let frequent = detections.classes.values().filter(|(_, _, n)| *n >= MIN_FREQUENT_INSTANCES);
     let frequent: Vec<f64> = frequent.map(|(ap50, _, _)| *ap50).collect();
     let n_frequent = frequent.len();
+    let scored = scored.concat();
     let report = DetectionReport {
         views: n_views,
         map50: detections.map50,
         map: detections.map,
         smaller: SMALLER_PX.iter().map(|px| (*px, map_in(&(*px..=u32::MAX)))).collect(),
         sizes: SIZES.iter().map(|(name, areas)| (*name, map_in(areas))).collect(),
-        map50_of_frequent: (frequent.iter().sum::<f64>() / n_frequent.max(1) as f64, n_frequent),
-        calibration_error: calibration_error(&scored.concat()),
+        map50_of_frequent: (mean(frequent.into_iter()), n_frequent),
+        calibration_error: (!scored.is_empty()).then(|| calibration_error(&scored)),
         errors: ErrorBreakdown::new(&images, &EVALUATED_AREAS),
         noise_model: DetectorNoiseModel::measured(&images),
         classes: detections.classes.iter().map(|(label, c)| (name(*label), *c)).collect(),

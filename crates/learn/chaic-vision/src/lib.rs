@@ -22,6 +22,7 @@
 //! - The same seed and configuration give the same weights, bit for bit, on any machine and number
 //!   of threads.
 
+mod keyframe;
 pub mod labels;
 mod parallel;
 mod structures;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use chaic_agents::perception::{Perception, Percepts, PixelKind, STRIDE, Segments};
+use chaic_agents::perception::{Detection, Perception, Percepts, PixelKind, STRIDE, Segments};
 use chaic_agents::perception_factory::PerceptionFactory;
 use chaic_agents::track::{Hands, Intent, TrackId};
 use chaic_core::geom::Camera;
@@ -11,6 +11,7 @@ use chaic_core::observation::{Grants, SensorConfig};
 use chaic_core::{Briefing, ClassId, EntityId, Observation, Outcome, Target};
 
 use crate::instances::Instance;
+use crate::keyframe::Keyframe;
 use crate::labels::label_of;
 use crate::tracker::{Measurement, Tracker, TrackerConfig};
 use crate::trained::{DetectorInference, TrainedDetector};
@@ -66,6 +67,7 @@ impl PerceptionFactory for LearnedPerceptionFactory {
             inference,
             has_true_names: self.has_true_names,
             tracking: Tracking::default(),
+            keyframe: None,
         })
     }
 }
@@ -77,11 +79,13 @@ struct LearnedPerception {
     inference: DetectorInference,
     has_true_names: bool,
     tracking: Tracking,
+    keyframe: Option<Keyframe>,
 }
 
 impl Perception for LearnedPerception {
     fn reset(&mut self, briefing: &Briefing) {
         self.tracking = Tracking::new(briefing);
+        self.keyframe = None;
     }
 
     fn update_hands(&mut self, hands: &Hands, last: Option<(Intent, Outcome)>) {
@@ -100,12 +104,19 @@ impl Perception for LearnedPerception {
         if !self.detector.fits(camera) || rgb.len() != 3 * n_pixels || depth_m.len() != n_pixels {
             return Percepts::default();
         }
+        if let Some(keyframe) = self.keyframe.as_ref().filter(|k| k.is_similar(observation)) {
+            let percepts = keyframe.reuse(observation, depth_m);
+            self.tracking.reuse(&percepts.detections, depth_m, observation);
+            return percepts;
+        }
         let mut instances = self.detector.detect(rgb, depth_m, camera, &mut self.inference);
         if self.has_true_names {
             let ids = images.ids.as_deref().unwrap_or_default();
             instances = with_true_names(instances, ids, |id| observation.granted.class_of(id));
         }
-        self.tracking.update(&instances, depth_m, observation)
+        let percepts = self.tracking.update(&instances, depth_m, observation);
+        self.keyframe = Some(Keyframe::new(observation, depth_m, &percepts.detections));
+        percepts
     }
 
     fn target(&self, track: TrackId) -> Option<Target> {
@@ -177,7 +188,14 @@ impl Tracking {
         self.tracker.mask_movables(depth_m, camera, STRIDE, &mut dynamic_mask);
         self.last = detections.iter().map(|d| (d.track, d.pixel)).collect();
         self.last.extend(self.tracker.missed(frame, depth_m, camera));
-        Percepts { detections, dynamic_mask, stride: STRIDE, hands: None }
+        Percepts { detections, dynamic_mask, stride: STRIDE, ..Percepts::default() }
+    }
+
+    /// Finds the pixels of the tracks in an image whose detections are those of a keyframe.
+    fn reuse(&mut self, detections: &[Detection], depth_m: &[f32], observation: &Observation) {
+        self.last = detections.iter().map(|d| (d.track, d.pixel)).collect();
+        let (frame, camera) = (observation.frame, &observation.camera);
+        self.last.extend(self.tracker.missed(frame, depth_m, camera));
     }
 
     pub(crate) fn target(&self, track: TrackId) -> Option<Target> {

@@ -32,7 +32,7 @@ const MAX_BYTES: u64 = 1 << 28;
 /// Error of a perception or behavior name.
 #[derive(Debug, thiserror::Error)]
 pub enum PerceptionError {
-    /// The name is unknown.
+    /// The name is unknown, or lacks its file.
     #[error("{0}")]
     Unknown(String),
     /// The file cannot be read.
@@ -76,6 +76,16 @@ fn file_of<'a>(name: &'a str, kind: &str) -> Option<&'a Path> {
     name.strip_prefix(kind)?.strip_prefix(':').map(Path::new)
 }
 
+/// Checks that a name such as `KIND:FILE` has a file, for these kinds.
+fn check_has_file(name: &str, kinds: &[&str]) -> Result<(), PerceptionError> {
+    match name.strip_suffix(':') {
+        Some(kind) if kinds.contains(&kind) => Err(PerceptionError::Unknown(format!(
+            "`{name}` has no file after the colon; write {kind}:FILE or {kind}"
+        ))),
+        _ => Ok(()),
+    }
+}
+
 /// Reads a detector of one or two stages from a file.
 ///
 /// # Errors
@@ -114,6 +124,8 @@ pub fn perception_from_name(
     perception: &str,
     behavior: &str,
 ) -> Result<Arc<dyn PerceptionFactory>, PerceptionError> {
+    check_has_file(perception, &[LEARNED, GT_NAMES, NOISY])?;
+    check_has_file(behavior, &[LEARNED])?;
     let factory = factory_from_name(perception)?;
     let trained = match weights_of(behavior) {
         Some(file) => read_behavior(file)?,
@@ -182,6 +194,21 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_name_without_the_file_after_its_colon_is_refused() {
+        for (perception, behavior) in [
+            ("learned:", GROUND_TRUTH),
+            ("gt_names:", GROUND_TRUTH),
+            ("noisy:", GROUND_TRUTH),
+            (GROUND_TRUTH, "learned:"),
+        ] {
+            let error = perception_from_name(perception, behavior).err().expect(perception);
+            assert!(matches!(error, PerceptionError::Unknown(_)), "{error}");
+            let text = error.to_string();
+            assert!(text.contains(":` has no file after the colon"), "{text}");
+        }
+    }
+
+    #[test]
     fn files_that_hold_no_complete_detector_are_refused_in_one_line() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("weights.safetensors");
@@ -203,7 +230,7 @@ mod tests {
         let bytes = complete.to_bytes().unwrap();
         refused(Some(&bytes[..bytes.len() / 2]), "not a weights file");
         let behavior = TrainedBehavior::built_in().to_bytes().unwrap();
-        refused(Some(&behavior), "weights of `chaic behavior 2`, expected `chaic detector 2");
+        refused(Some(&behavior), "weights of `chaic behavior 3`, expected `chaic detector 2");
         let one_stage = TrainedDetector { second_stage: None, ..complete };
         refused(Some(&one_stage.to_bytes().unwrap()), "lacks its second stage; train it with");
         // Evaluations and trainings between the two stages read it.

@@ -53,6 +53,29 @@ pub(crate) const ROI_BOUNDS: BoundTable = &[
     ("proposals_per_view", integer(1, MAX_PROPOSALS as i64)),
 ];
 
+/// Maximum number of proposals of a shard. A pass cannot be interrupted.
+const MAX_SHARD_PROPOSALS: usize = 512;
+/// Maximum number of proposals that all shards process at once. A proposal takes 3.4 MB, which makes
+/// 14 GB.
+const MAX_BATCH_PROPOSALS: usize = 4096;
+
+impl RoiTrainingConfig {
+    /// Checks that the proposals of a step fit in memory.
+    ///
+    /// # Errors
+    /// One line that names the keys.
+    pub(crate) fn check(&self, shards: usize) -> Result<(), String> {
+        let n = self.views * self.proposals_per_view;
+        if n > MAX_SHARD_PROPOSALS || shards * n > MAX_BATCH_PROPOSALS {
+            return Err(format!(
+                "second_stage.views times second_stage.proposals_per_view is {n}; it must be from 1 to \
+                 {MAX_SHARD_PROPOSALS}, and times shards, which is {shards}, up to {MAX_BATCH_PROPOSALS}"
+            ));
+        }
+        Ok(())
+    }
+}
+
 /// Proposals of several views.
 #[derive(Default)]
 pub(crate) struct RoiBatch {

@@ -195,10 +195,15 @@ fn configurations_whose_keys_contradict_each_other_are_refused() {
         ("[loss]\nweight_range = [2.0, 1.0]", "weight_range"),
         ("[views]\nsize_px = 128", "side_px"),
         ("shards = 200", "shards"),
+        ("[second_stage]\nviews = 64", "second_stage.proposals_per_view is 1024"),
+        ("shards = 16\n[second_stage]\nviews = 20", "times shards, which is 16, up to 4096"),
     ] {
         let refused = parse_config::<DetectorLearner>(text).unwrap_err();
         assert!(refused.contains(problem), "{refused}");
     }
+    // The last part of the training of the bundled weights.
+    let text = "seed = 2\nsteps = 0\nshards = 16\n[second_stage]\nsteps = 280";
+    assert!(parse_config::<DetectorLearner>(text).is_ok());
 }
 
 #[test]
@@ -267,7 +272,7 @@ fn the_bundled_detector_finds_most_objects() {
     let (split, config) = (DatasetSplit::Validation, ViewConfig::NATURAL);
     let evaluated = report(&trained, split, config, 8, 2, |_, _, _| (), &NEVER_STOP);
     let (found, _) = evaluated.expect("it is not stopped");
-    assert!(found.map50 > 0.5, "{}", found.map50);
+    assert!(found.map50 > Some(0.5), "{:?}", found.map50);
     assert!(report(&trained, split, config, 8, 2, |_, _, _| (), &AtomicBool::new(true)).is_none());
 }
 
@@ -338,9 +343,11 @@ fn second_stage_gradients_match_finite_differences() {
     let network = RoiNetwork::new();
     let mut rng = RngStream::new(1, "loss", 0);
     let n_samples = SIDE * SIDE;
+    // One sample in eight lies outside of the image, and one shows the background: with as many as of
+    // the object, the gradient of the mask's bias would be near zero.
     let target = |label: u8| RoiTarget {
         label,
-        mask: (0..n_samples).map(|k| (k % 3) as i8 - 1).collect(),
+        mask: (0..n_samples).map(|k| ((k % 8) as i8 - 1).min(1)).collect(),
         n_outside: 40.0,
         iou: 0.3,
     };
@@ -358,21 +365,23 @@ fn second_stage_gradients_match_finite_differences() {
         let loss = roi_loss(&network, &targets, &mut pass);
         let mut gradient = vec![0.0; parameters.len()];
         pass.backward(&network.network, parameters, &mut gradient);
-        (loss.labels + loss.mask + 0.5 * loss.qualities, gradient)
+        ([loss.labels + loss.mask + 0.5 * loss.qualities, loss.mask], gradient)
     };
     let (_, gradient) = loss_and_gradient(&parameters);
-    // Biases of the heads change no threshold of the redrawn masks unless a logit is near zero.
-    for name in ["labels.bias", "qualities.bias"] {
+    // The quality targets are step functions of the redrawn masks, so the bias of the masks is compared
+    // with the loss of the masks alone.
+    for (name, which) in [("labels.bias", 0), ("qualities.bias", 0), ("mask.bias", 1)] {
         let range = network.network.parameters().iter().find(|p| p.name == name).unwrap();
         for k in range.range.clone().step_by(20) {
             let (h, before) = (1e-2, parameters[k]);
             let mut at = |value: f32| {
                 parameters[k] = value;
-                loss_and_gradient(&parameters).0
+                loss_and_gradient(&parameters).0[which]
             };
             let measured = (at(before + h) - at(before - h)) / (2.0 * f64::from(h));
             parameters[k] = before;
             let exact = f64::from(gradient[k]);
+            assert!(name != "mask.bias" || exact < -0.2, "{exact} for six of seven samples");
             // The exponential function of the loss is accurate to half a percent.
             let is_equal = (measured - exact).abs() < 2e-3 + 0.02 * exact.abs();
             assert!(is_equal, "{name} {k}: {measured} for {exact}");
@@ -446,6 +455,6 @@ fn perfect_labels_and_offsets_give_the_true_instances() {
     let n_evaluated =
         images.iter().flat_map(|i| &i.truths).filter(|t| evaluated_areas.contains(&t.area)).count();
     let found = average_precision(&images, &evaluated_areas);
-    println!("{n_evaluated} instances: {:.3}, {:.3}", found.map50, found.map);
-    assert!(n_evaluated > 60 && found.map50 > 0.9, "{n_evaluated}: {found:?}");
+    println!("{n_evaluated} instances: {:?}, {:?}", found.map50, found.map);
+    assert!(n_evaluated > 60 && found.map50 > Some(0.9), "{n_evaluated}: {found:?}");
 }

@@ -33,8 +33,12 @@ use crate::views::DatasetSplit;
 
 /// Upper ends of the ranges of distance, meters. Objects are measured up to 10 m (facts A1.8).
 const RANGES_M: [u32; 4] = [2, 4, 7, 10];
-/// Number of seeds that are tried for an episode.
-const MAX_ATTEMPTS: u64 = 20;
+/// Maximum number of episodes of an evaluation: half of the seeds, so that the other half can replace
+/// those without a valid episode.
+pub const MAX_EPISODES: u32 = 5000;
+/// Number of seeds that are tried for an episode. Up to the number of tasks, no episode can occur
+/// twice.
+const MAX_ATTEMPTS: u64 = 8;
 /// A remembered object may be this far from the true position, plus half of its largest horizontal
 /// extent, meters.
 const MAX_ERROR_M: f32 = 0.5;
@@ -42,25 +46,28 @@ const MAX_ERROR_M: f32 = 0.5;
 /// Ratio of counts with the half width of its 95 % interval over episodes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Rate {
-    /// Ratio of the sums; 0 without any count.
-    pub value: f64,
-    /// Half width of the interval (linearized variance of a ratio of sums over episodes).
-    pub interval: f64,
+    /// Ratio of the sums; `None` if the denominators are 0.
+    pub value: Option<f64>,
+    /// Half width of the interval (linearized variance of a ratio of sums over episodes); `None` unless
+    /// two episodes have a denominator above 0.
+    pub interval: Option<f64>,
     /// Sum of the denominators.
     pub n: usize,
 }
 
 impl Rate {
     /// Computes the ratio from the numerator and denominator of each episode.
-    fn new(counts: impl Iterator<Item = [usize; 2]> + Clone) -> Rate {
+    pub(crate) fn new(counts: impl Iterator<Item = [usize; 2]> + Clone) -> Rate {
         let sum = |k: usize| counts.clone().map(|c| c[k]).sum::<usize>();
         let (n, n_episodes) = (sum(1), counts.clone().count() as f64);
-        let value = sum(0) as f64 / n.max(1) as f64;
-        let residuals = counts.clone().map(|[a, b]| a as f64 - value * b as f64);
-        let correction = n_episodes / (n_episodes - 1.0).max(1.0);
-        let squares: f64 = residuals.map(|residual| residual * residual).sum();
-        let error = (correction * squares).sqrt() / n.max(1) as f64;
-        Rate { value, interval: 1.96 * error, n }
+        let value = (n > 0).then(|| sum(0) as f64 / n as f64);
+        let has_interval = counts.clone().filter(|c| c[1] > 0).count() > 1;
+        let half_width = |value: f64| {
+            let residuals = counts.clone().map(|[a, b]| a as f64 - value * b as f64);
+            let squares: f64 = residuals.map(|residual| residual * residual).sum();
+            1.96 * (n_episodes / (n_episodes - 1.0) * squares).sqrt() / n as f64
+        };
+        Rate { value, interval: value.filter(|_| has_interval).map(half_width), n }
     }
 }
 
@@ -98,8 +105,8 @@ pub struct TrackReport {
     /// Fraction of people of [`MIN_AREA_PX`] pixels and more that are detected within 0.5 m of their
     /// position.
     pub person_recall: Rate,
-    /// Expected calibration error of the confidences of detections.
-    pub calibration_error: f64,
+    /// Expected calibration error of the confidences of detections; `None` without detections.
+    pub calibration_error: Option<f64>,
     /// Counts by class name.
     pub classes: BTreeMap<&'static str, ClassCounts>,
 }
@@ -126,8 +133,17 @@ pub struct ClassCounts {
     pub identity_switches: usize,
 }
 
-/// Plays episodes of a split and evaluates the tracks. Tasks take turns. `progress` is called after
-/// each episode. Returns `None` if `stop` is set meanwhile.
+/// Returns the position of a seed in a range of `n_seeds`. Episode `k` has the `k`th one; if it is
+/// invalid, further attempts replace it by seeds from the end of the range.
+fn seed_position(k: u64, attempt: u64, n_seeds: u64) -> u64 {
+    match attempt.checked_sub(1) {
+        None => k,
+        Some(n) => n_seeds - 1 - (k + n) % u64::from(MAX_EPISODES),
+    }
+}
+
+/// Plays episodes of a split, at most [`MAX_EPISODES`], and evaluates the tracks. Tasks take turns.
+/// `progress` is called after each episode. Returns `None` if `stop` is set meanwhile.
 pub fn evaluate_tracks(
     perception: &dyn PerceptionFactory,
     split: DatasetSplit,
@@ -140,7 +156,7 @@ pub fn evaluate_tracks(
     let seeds = SeedRange::perception(split);
     let play = |(): &mut (), k: usize| {
         // Some seeds have no valid episode.
-        let seed = |attempt: u64| seeds.first + (k as u64 + attempt * 1000) % seeds.count;
+        let seed = |attempt| seeds.first + seed_position(k as u64, attempt, seeds.count);
         let id = |attempt| format!("{}/gen-standard/{}", tasks[k % tasks.len()], seed(attempt));
         let found = (0..MAX_ATTEMPTS).find_map(|attempt| find_episode(&id(attempt)).ok());
         let episode = found.expect("one of several seeds has an episode");
@@ -269,7 +285,7 @@ impl EpisodeRecord {
         class.info().is_movable() || self.goal_places.contains(&class)
     }
 
-    /// Adds one image with its detections.
+    /// Adds one image with its detections. Reused detections do not count.
     fn add_image(&mut self, observation: &Observation, percepts: &Percepts) {
         let held = observation.proprioception.held().filter_map(|held| held.identity.as_ref());
         self.held.extend(held.flat_map(|held| {
@@ -290,13 +306,17 @@ impl EpisodeRecord {
             let entity = ids.get(row * width + column).map(|id| EntityId(*id));
             let entity = entity
                 .filter(|entity| observation.granted.class_of(*entity) == Some(detection.class));
-            self.detections.push((detection.confidence, entity.is_some()));
+            if !percepts.is_reused {
+                self.detections.push((detection.confidence, entity.is_some()));
+            }
             if let Some(entity) = entity {
                 track_of.insert(entity, detection.track);
             }
         }
         let truths = GroundTruthIds.perceive(observation).detections;
-        self.people.add(&percepts.detections, &truths);
+        if !percepts.is_reused {
+            self.people.add(&percepts.detections, &truths);
+        }
         for truth in truths {
             let entity = u16::try_from(truth.track.0).map(EntityId);
             let Ok(entity) = entity else { continue };
@@ -312,7 +332,9 @@ impl EpisodeRecord {
             object.last = last;
             if truth.n_pixels >= MIN_AREA_PX {
                 object.nearest_m = object.nearest_m.min(distance_m);
-                self.visible.push((distance_m, track.is_some()));
+                if !percepts.is_reused {
+                    self.visible.push((distance_m, track.is_some()));
+                }
             }
             if let Some(track) = track {
                 object.n_switches += usize::from(object.track.is_some_and(|old| old != track));
@@ -432,7 +454,7 @@ impl TrackReport {
                 records.iter().map(|r| [r.people.correct, r.people.detected]),
             ),
             person_recall: Rate::new(records.iter().map(|r| [r.people.found, r.people.visible])),
-            calibration_error: calibration_error(&scored),
+            calibration_error: (!scored.is_empty()).then(|| calibration_error(&scored)),
             classes,
         }
     }

@@ -158,7 +158,11 @@ const MIN_DEPTH_ERROR_M: f32 = 0.05;
 
 /// Returns the pixel of a point, the depth of the point and the depth in the image, meters; `None`
 /// outside the image.
-fn depths_at(point: Vec3, depth_m: &[f32], camera: &Camera) -> Option<([u32; 2], f32, f32)> {
+pub(crate) fn depths_at(
+    point: Vec3,
+    depth_m: &[f32],
+    camera: &Camera,
+) -> Option<([u32; 2], f32, f32)> {
     let size = Vec2::new(camera.width as f32, camera.height as f32);
     let (px, depth) = camera.project(point)?;
     if px.cmplt(Vec2::ZERO).any() || px.cmpge(size).any() {

@@ -12,8 +12,8 @@ use chaic_training::bounds::{
     ADAM, Bound, BoundTable, FRACTION, LEARNING_RATE, MAX_STEPS, SEED, SHARDS, STEPS, integer, real,
 };
 use chaic_training::{
-    Checkpoint, CheckpointError, Learner, Metrics, Trainer, TrainingError, learning_rate_at,
-    metrics,
+    Checkpoint, CheckpointError, Learner, Metrics, Trainer, TrainingError, defined_metrics,
+    learning_rate_at, metrics,
 };
 use serde::{Deserialize, Serialize};
 
@@ -436,7 +436,8 @@ impl Trainer for DetectorLearner {
         if loss.weight_range[0] > loss.weight_range[1] {
             return Err("loss.weight_range must be minimum and maximum".to_owned());
         }
-        config.crops.iter().try_for_each(|crops| crops.check(views, *shards))
+        config.crops.iter().try_for_each(|crops| crops.check(views, *shards))?;
+        config.second_stage.check(*shards)
     }
 
     fn read_weights(
@@ -526,7 +527,7 @@ impl Trainer for DetectorLearner {
         let calibration = calibrate(&detector, natural, calibration_views, shards, stop);
         let Some(calibration) = calibration else { return Ok(None) };
         detector.calibration = calibration;
-        let metrics = metrics([("map50", precision.map50), ("map", precision.map)]);
+        let metrics = defined_metrics([("map50", precision.map50), ("map", precision.map)]);
         Ok(Some((metrics, detector.to_bytes()?)))
     }
 }

@@ -244,7 +244,7 @@ impl World {
         let t = step.progress();
         match step.phase {
             Phase::Reach { hand: h, to, fails } if applies(h) => {
-                // A failed reach goes up and returns half of the way.
+                // A failed reach arrives after two thirds of its time and stays there.
                 let t = if fails { (1.5 * t).min(1.0) } else { t };
                 rest.lerp(spread(to, h), t * t * (3.0 - 2.0 * t))
             }

@@ -1,11 +1,12 @@
 //! Complete agents in a toy house: they deliver objects, and never get stuck.
 
-use chaic_core::ClassId;
 use chaic_core::capability::Persona;
 use chaic_core::observation::Grants;
 use chaic_core::task::SceneKind;
+use chaic_core::{ClassId, Hand};
 
 use super::*;
+use crate::perception::{GroundTruthIds, PixelTargets};
 use crate::perception_factory::{GroundTruthPerceptionFactory, GroundTruthTracksFactory};
 use crate::policies::{PartnerVariantPolicy, RulePolicy, RuleProfile};
 use crate::rules::ObstacleChoice;
@@ -429,4 +430,30 @@ fn a_blocked_doorway_is_not_tried_endlessly() {
         longest = longest.max(toy.frame - since);
     }
     assert!(longest < 300, "{longest} frames at one place");
+}
+
+#[test]
+fn turns_to_one_object_do_not_count_for_another() {
+    let mut toy = Toy::room(6.0, 6.0);
+    for x in [-1.0, 1.0] {
+        toy.add(ToyObject::new("apple", [x, 0.5, -2.0], [0.16, 0.12, 0.16]));
+    }
+    toy.stand([0.0, 1.0], 0.0);
+    let briefing = toy.briefing();
+    let mut episode = Episode::new(&briefing, PlannerRules::paper());
+    let observation = toy.observe();
+    let percepts = GroundTruthIds.perceive(&observation);
+    assert_eq!(percepts.detections.len(), 2);
+    episode.memory.update(&briefing, &observation, &percepts);
+    // The objects are behind it, and no image shows them.
+    episode.memory.pose.yaw_rad = std::f32::consts::PI;
+    let perception = PixelTargets::<GroundTruthIds>::default();
+    let mut turns_to = |track: TrackId, n: u32| {
+        let pick_up = Action::PickUp { object: track, hand: Hand::Left };
+        (0..n).all(|_| episode.resolve(pick_up, &perception).is_some())
+    };
+    let [a, b] = [0, 1].map(|k| percepts.detections[k].track);
+    assert!(turns_to(a, MAX_SEARCH_TURNS - 1));
+    assert!(turns_to(b, MAX_SEARCH_TURNS));
+    assert!(!turns_to(b, 1), "it turns forever");
 }

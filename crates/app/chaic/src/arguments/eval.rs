@@ -46,8 +46,8 @@ pub struct EvalArguments {
     #[arg(long, alias = "tasks", value_name = "NAMES", value_parser = tasks)]
     pub task: Option<Tasks>,
     /// Helpers, separated by commas; repeatable; `chaic list helpers` prints them. Also a helper process,
-    /// [NAME=]exec:COMMAND, or a policy of `chaic train`, [NAME=]policy:FILE
-    /// [default: none,random,rhp,oracle].
+    /// [NAME=]exec:COMMAND, or a policy of `chaic train`, [NAME=]policy:FILE. Each of these is the last of
+    /// its list: repeat --helper for another [default: none,random,rhp,oracle].
     #[arg(long, alias = "helpers", value_name = "NAMES", value_parser = helpers)]
     pub helper: Option<Vec<HelperList>>,
     /// Split of episodes: test, train, standard, gen:A..B or gen-standard:A..B, for example gen:0..100
@@ -184,10 +184,22 @@ impl EvalArguments {
     }
 }
 
-/// Endpoint of the language model.
+/// Source of the answers of language helpers: an endpoint or a recorded run.
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Language helpers")]
 pub struct LanguageArguments {
+    #[command(flatten)]
+    pub endpoint: EndpointArguments,
+    /// Use the recorded answers of the run DIR (replay:DIR) and contact no endpoint.
+    #[arg(long, value_name = "SOURCE", value_parser = chaic_llm::language::replay_folder,
+        conflicts_with_all = ["endpoint", "model", "llm_key_env", "llm_allow_http", "llm_config"])]
+    pub llm: Option<PathBuf>,
+}
+
+/// Endpoint of the language model.
+#[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Language helpers")]
+pub struct EndpointArguments {
     /// Address of the language model, for example http://127.0.0.1:8000/v1. The key is read from the
     /// environment variable OPENAI_API_KEY. Give it again with --resume.
     #[arg(long, value_name = "URL")]
@@ -204,8 +216,4 @@ pub struct LanguageArguments {
     /// Settings of language helpers; docs/language-helpers.md.
     #[arg(long, value_name = "FILE.toml")]
     pub llm_config: Option<PathBuf>,
-    /// Use the recorded answers of the run DIR (replay:DIR) and contact no endpoint.
-    #[arg(long, value_name = "SOURCE", value_parser = chaic_llm::language::replay_folder,
-        conflicts_with_all = ["endpoint", "model", "llm_key_env", "llm_allow_http", "llm_config"])]
-    pub llm: Option<PathBuf>,
 }

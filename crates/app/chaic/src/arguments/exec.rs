@@ -1,6 +1,6 @@
 //! Helper processes: values of `--helper`, options of the sandbox, and `chaic helper`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use chaic_core::observation::Grants;
@@ -83,12 +83,13 @@ fn names(text: &str) -> HelperArgument {
 /// Parses one helper, or names.
 fn helper(text: &str) -> Result<HelperArgument, String> {
     if let Some((name, file)) = split_kind(text, KINDS[0], DEFAULT_POLICY_NAME) {
+        check_path(file)?;
         return Ok(HelperArgument::Policy { name: name.to_owned(), file: file.into() });
     }
     let Some((name, line)) = split_kind(text, KINDS[1], DEFAULT_PROCESS_NAME) else {
         return Ok(names(text));
     };
-    if line.trim().is_empty() {
+    if is_blank(line) {
         return Err(
             "no command; write exec:COMMAND, for example exec:\"python3 helper.py\"".to_owned()
         );
@@ -96,8 +97,31 @@ fn helper(text: &str) -> Result<HelperArgument, String> {
     Ok(HelperArgument::Exec { name: name.to_owned(), line: line.to_owned() })
 }
 
+/// Checks the path of a policy.
+fn check_path(file: &str) -> Result<(), String> {
+    if is_blank(file) {
+        let example = "policy:runs/clone/policy.safetensors";
+        return Err(format!("no file after the colon; write policy:FILE, for example {example}"));
+    }
+    // A path may contain commas.
+    let mut after_commas = file.match_indices(',').map(|(at, _)| &file[at + 1..]);
+    let is_helper = |rest: &&str| KINDS.iter().any(|kind| split_kind(rest, kind, "").is_some());
+    match after_commas.find(is_helper) {
+        Some(further) if !Path::new(file).exists() => Err(format!(
+            "no file `{file}`; a policy or a process is the last of its list, so write --helper \
+             {further} for another"
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// Returns whether a path or command is empty.
+fn is_blank(text: &str) -> bool {
+    text.trim().is_empty()
+}
+
 /// Grants and limits of helper processes.
-#[derive(Args, Clone, Debug, Default)]
+#[derive(Args, Clone, Debug, Default, PartialEq)]
 #[command(next_help_heading = "Helper processes")]
 pub struct ExecArguments {
     /// Grants of helper processes, separated by commas: ids, goal_place, goal, progress, behavior,
@@ -131,6 +155,19 @@ pub struct ExecArguments {
 }
 
 impl ExecArguments {
+    /// Checks that there is a helper process if one of these options is given.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn check_used(&self, n_processes: usize) -> Result<(), Refusal> {
+        if n_processes == 0 && *self != ExecArguments::default() {
+            let text = "no helper is a process, so no --exec option has an effect; name one, for \
+                        example --helper exec:\"python3 helper.py\"";
+            return Err(Refusal(text.to_owned()));
+        }
+        Ok(())
+    }
+
     /// Returns the helper process with this name and command line.
     pub fn command(&self, name: &str, line: &str) -> HelperProgram {
         let default = Limits::default();
@@ -188,7 +225,7 @@ pub enum HelperCommand {
 #[derive(Args, Debug)]
 pub struct HelperCheckArguments {
     /// Shell command that starts the helper, such as `python3 helper.py`.
-    #[arg(value_name = "COMMAND")]
+    #[arg(value_name = "COMMAND", value_parser = command_line)]
     pub line: String,
     #[command(flatten)]
     pub exec: ExecArguments,
@@ -203,6 +240,13 @@ pub struct HelperServeArguments {
     /// Rule set: paper, or compat for the behavior of the original's code.
     #[arg(long, value_name = "NAME", default_value = "paper")]
     pub rules: RuleSetName,
+}
+
+fn command_line(text: &str) -> Result<String, String> {
+    if is_blank(text) {
+        return Err("no command; write one, for example \"python3 helper.py\"".to_owned());
+    }
+    Ok(text.to_owned())
 }
 
 fn grants(text: &str) -> Result<Grants, String> {
@@ -242,6 +286,26 @@ mod tests {
         ] {
             assert_eq!(helpers(text), Ok(HelperList(expected)), "{text}");
         }
-        assert!(helpers("none,exec:").is_err());
+        for (text, problem) in [
+            ("none,exec:", "no command"),
+            ("policy:", "no file after the colon"),
+            ("none,mine=policy:", "no file after the colon"),
+            ("none,m=policy:a.st,v=policy:b.st", "so write --helper v=policy:b.st for another"),
+            ("m=policy:a.st,exec:b", "so write --helper exec:b for another"),
+        ] {
+            let refused = helpers(text).expect_err(text);
+            assert!(refused.contains(problem), "{text}: {refused}");
+        }
+        assert!(command_line(" ").is_err() && command_line("true").is_ok());
+    }
+
+    #[test]
+    fn options_of_helper_processes_need_one() {
+        let none = ExecArguments::default();
+        assert_eq!(none.check_used(0), Ok(()));
+        let some = ExecArguments { exec_read: vec!["nofile".into()], ..none };
+        assert_eq!(some.check_used(1), Ok(()));
+        let refused = some.check_used(0).expect_err("no process").to_string();
+        assert!(refused.contains("no helper is a process"), "{refused}");
     }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use chaic_core::AgentId;
 use clap::Subcommand;
 
-use super::{LanguageArguments, agent, ranges};
+use super::{EndpointArguments, agent, ranges};
 
 /// `chaic llm`.
 #[derive(Debug, Subcommand)]
@@ -38,6 +38,6 @@ pub enum LlmCommand {
     /// Send two test questions to the endpoint: one with a JSON schema, one as text.
     Check {
         #[command(flatten)]
-        language: LanguageArguments,
+        endpoint: EndpointArguments,
     },
 }

@@ -34,7 +34,7 @@ pub struct TrainArguments {
     /// Folder of the training, for example runs/ppo: configuration, checkpoint, curves, weights.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// TOML file with the keys that differ from the default. The config.toml of any training has all keys.
+    /// TOML file with the keys that differ from the default. The config.toml of a training has all keys with a value.
     #[arg(long, value_name = "FILE", conflicts_with = "resume")]
     pub config: Option<PathBuf>,
     /// Change one key of the configuration, for example rollout.image_size=128; repeatable.
@@ -190,6 +190,10 @@ pub struct BehaviorArguments {
     pub weights: Option<PathBuf>,
     #[command(flatten)]
     pub clips: ClipArguments,
+    /// Keep the clips in this folder. The next evaluation with the same options reads them, and an
+    /// interrupted one continues.
+    #[arg(long, value_name = "DIR")]
+    pub clip_folder: Option<PathBuf>,
     /// Also write all metrics to a JSON file.
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
@@ -201,9 +205,9 @@ pub struct TracksArguments {
     /// Evaluated perception: learned, noisy, gt_names (each also as NAME:FILE), gt_masks or gt_tracks.
     #[arg(long, value_name = "KIND", default_value = "learned")]
     pub perception: String,
-    /// Number of episodes; tasks take turns, 1 to 100000.
+    /// Number of episodes, 1 to 5000; tasks take turns.
     #[arg(long, value_name = "N", default_value_t = 32)]
-    #[arg(value_parser = clap::value_parser!(u32).range(ranges::EPISODES))]
+    #[arg(value_parser = clap::value_parser!(u32).range(ranges::TRACK_EPISODES))]
     pub n_episodes: u32,
     /// Also write all metrics to a JSON file.
     #[arg(long, value_name = "FILE")]

@@ -7,6 +7,7 @@ use chaic_learn::opponent::collect::MAX_WINDOWS;
 use chaic_study::MAX_PARTICIPANTS;
 use chaic_training::bounds::MAX_STEPS;
 use chaic_vision::behavior::config::{MAX_CLIPS, MAX_EPISODES};
+use chaic_vision::track_evaluation::MAX_EPISODES as MAX_TRACK_EPISODES;
 
 /// Jobs in parallel: more than the cores of any machine.
 pub(super) const JOBS: RangeInclusive<i64> = 1..=1024;
@@ -32,6 +33,8 @@ pub(super) const CLIPS: RangeInclusive<i64> = 1..=MAX_CLIPS as i64;
 pub(super) const WINDOWS: RangeInclusive<i64> = 1..=MAX_WINDOWS as i64;
 /// Episodes from which clips or windows are collected.
 pub(super) const EPISODES: RangeInclusive<i64> = 1..=MAX_EPISODES as i64;
+/// Episodes in which tracks are evaluated.
+pub(super) const TRACK_EPISODES: RangeInclusive<i64> = 1..=MAX_TRACK_EPISODES as i64;
 /// Simulated participants of a study.
 pub(super) const PARTICIPANTS: RangeInclusive<i64> = 1..=MAX_PARTICIPANTS as i64;
 /// Steps of a training.

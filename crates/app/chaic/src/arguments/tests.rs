@@ -138,6 +138,18 @@ fn every_command_has_examples_that_parse() {
     }
 }
 
+/// A served helper refuses a briefing without its grants.
+#[test]
+fn examples_with_a_served_helper_grant_what_it_needs() {
+    let lines = examples().flat_map(|(_, examples)| examples.iter().map(|(_, line)| *line));
+    let is_process = |line: &&str| line.contains("chaic helper serve ") && line.contains('\'');
+    let processes: Vec<&str> = lines.filter(is_process).collect();
+    assert_eq!(processes.len(), 2, "{processes:?}");
+    for line in processes {
+        assert!(line.contains("--exec-grants ids,goal_place"), "{line}");
+    }
+}
+
 #[test]
 fn help_has_standard_terms_and_short_lines() {
     for (path, mut command) in visible_commands(&command(), "chaic") {

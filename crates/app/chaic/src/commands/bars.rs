@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use chaic_env::RunKey;
 use chaic_eval::metrics::RunStatus;
-use chaic_eval::run::{FinishedJob, JobEvent, RunProgress};
+use chaic_eval::run::{FinishedJob, JobEvent, Run};
 use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::output::{is_quiet, print_error, print_progress, printable};
@@ -32,11 +32,14 @@ pub struct RunBars {
     suffix: String,
     /// Approximate maximum number of log lines.
     max_lines: u64,
+    /// True if the run has several seeds, which the messages then name.
+    has_seeds: bool,
 }
 
 impl RunBars {
-    /// Creates the bars of a run with this progress.
-    pub fn new(extent: RunProgress) -> RunBars {
+    /// Creates the bars of a run with its progress.
+    pub fn new(run: &Run) -> RunBars {
+        let (extent, has_seeds) = (run.progress(), run.options().seeds > 1);
         let all = MultiProgress::new();
         if is_quiet() {
             all.set_draw_target(ProgressDrawTarget::hidden());
@@ -49,12 +52,18 @@ impl RunBars {
         total.set_message("time left: known after the first episode");
         total.enable_steady_tick(Duration::from_millis(500));
         let (part, suffix) = (String::new(), String::new());
-        RunBars { all, total, workers: BTreeMap::new(), part, suffix, max_lines: 100 }
+        RunBars { all, total, workers: BTreeMap::new(), part, suffix, max_lines: 100, has_seeds }
     }
 
     /// Creates the bars of one of several runs.
-    pub fn for_part(extent: RunProgress, part: &str) -> RunBars {
-        RunBars { part: format!("{part}: "), max_lines: 20, ..RunBars::new(extent) }
+    pub fn for_part(run: &Run, part: &str) -> RunBars {
+        RunBars { part: format!("{part}: "), max_lines: 20, ..RunBars::new(run) }
+    }
+
+    /// Returns an episode run in words, with its seed if the run has several.
+    fn name_of(&self, key: &RunKey) -> String {
+        let seed = if self.has_seeds { format!(", seed {}", key.seed) } else { String::new() };
+        format!("{} with {}{seed}", key.episode, key.helper)
     }
 
     /// Returns a function that prints a line above the bars, from any thread.
@@ -76,8 +85,7 @@ impl RunBars {
                 let style = ProgressStyle::with_template("{bar:20} {pos:>4}/{len} frames  {msg}");
                 bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
                 let bar = self.all.insert_before(&self.total, bar);
-                let message = format!("{} with {}", key.episode, key.helper);
-                bar.set_message(printable(&message).into_owned());
+                bar.set_message(printable(&self.name_of(key)).into_owned());
                 if let Some((old, _)) = self.workers.insert(*worker, (bar, key.clone())) {
                     old.finish_and_clear();
                 }
@@ -92,8 +100,7 @@ impl RunBars {
                     bar.finish_and_clear();
                 }
                 if let RunStatus::Error { message } = &finished.result.status {
-                    let key = &finished.result.key;
-                    let line = format!("{} with {}: {message}", key.episode, key.helper);
+                    let line = format!("{}: {message}", self.name_of(&finished.result.key));
                     self.all.suspend(|| print_error(&line));
                 }
                 self.total.inc(1);
@@ -115,7 +122,6 @@ impl RunBars {
         {
             return;
         }
-        let key = &finished.result.key;
         let rate = finished
             .result
             .summary()
@@ -124,7 +130,7 @@ impl RunBars {
             .remaining
             .map_or(String::new(), |left| format!(", about {} left", time_left(left)));
         let (part, suffix) = (&self.part, &self.suffix);
-        let result = format!("{} with {}: {rate}{left}{suffix}", key.episode, key.helper);
+        let result = format!("{}: {rate}{left}{suffix}", self.name_of(&finished.result.key));
         print_progress(&format!("{part}{done}/{total} {result}"));
     }
 

@@ -181,9 +181,10 @@ fn env_text(speed: &EnvSpeed) -> String {
     let EnvSpeed { envs, size, partner_size, channels, threads, episodes, .. } = speed;
     let (steps, frames) = (speed.steps_per_second, speed.frames_per_second);
     let threads = counted(*threads, "thread");
+    let episodes = counted(*episodes as usize, "episode");
     format!(
         "{envs} environments, {channels}, {size} x {size}, partners {partner_size} x {partner_size}, \
-         {threads}: {steps:.0} helper steps a second, {frames:.0} frames a second; {episodes} episodes ended\n{}",
+         {threads}: {steps:.0} helper steps a second, {frames:.0} frames a second; {episodes} ended\n{}",
         machine_text(&speed.machine)
     )
 }

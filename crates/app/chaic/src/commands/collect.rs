@@ -15,7 +15,7 @@ use super::{bars, jobs, opponent, run_perception};
 use crate::arguments::{CollectBehaviorArguments, CollectCommand, CollectDetectionArguments};
 use crate::exit::ExitStatus;
 use crate::interrupt;
-use crate::output::{OutputFormat, print_error, print_result, quoted_path};
+use crate::output::{OutputFormat, json_path, print_error, print_result, quoted_path};
 
 /// Collects training data.
 pub fn run(command: &CollectCommand, format: OutputFormat) -> Result<ExitStatus> {
@@ -56,7 +56,7 @@ fn detection(arguments: &CollectDetectionArguments, format: OutputFormat) -> Res
     }
     text += &format!("Images:  {}\n", quoted_path(out));
     let json = json!({
-        "images": out, "complete": is_complete,
+        "images": json_path(out), "complete": is_complete,
         "sizes": ["below_100_px", "small", "medium", "large"], "instances": classes,
     });
     print_result(format, &json, &text)?;
@@ -88,7 +88,9 @@ fn behavior(arguments: &CollectBehaviorArguments, format: OutputFormat) -> Resul
     text += &format!("Clips: {}\n", quoted_path(&arguments.out));
     let counts: BTreeMap<&str, usize> =
         Behavior::ALL.into_iter().map(|behavior| (behavior.name(), count(behavior))).collect();
-    let json = json!({ "clips": arguments.out, "behaviors": counts, "moving_mixed": n_mixed });
+    let json = json!({
+        "clips": json_path(&arguments.out), "behaviors": counts, "moving_mixed": n_mixed,
+    });
     print_result(format, &json, &text)?;
     Ok(ExitStatus::Success)
 }

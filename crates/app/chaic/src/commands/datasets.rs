@@ -44,6 +44,8 @@ pub fn clip_config(arguments: &ClipArguments) -> ClipCollectionConfig {
         max_per_class: arguments.max_per_class as usize,
         episodes: arguments.n_episodes as usize,
         varied_fraction: appearance_fraction(arguments.appearance),
+        learned_fraction: 0.0,
+        noisy_fraction: 0.0,
         ..ClipCollectionConfig::default()
     }
 }

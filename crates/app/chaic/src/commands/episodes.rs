@@ -17,7 +17,8 @@ use crate::arguments::EpisodesCommand;
 use crate::exit::ExitStatus;
 use crate::interrupt;
 use crate::output::{
-    OutputFormat, counted, print, print_error, print_result, print_warning, print_while_read,
+    OutputFormat, counted, json_path, print, print_error, print_result, print_warning,
+    print_while_read,
 };
 
 /// Lists, shows, generates or validates episodes.
@@ -118,7 +119,7 @@ fn show(argument: &str, out: &Path, width_px: u32, format: OutputFormat) -> Resu
     let episode = super::episode(argument)?;
     frame_export::write_plan(&episode, width_px, out)?;
     let text = format!("{}: floor plan of {}\n", out.display(), episode.id());
-    print_result(format, &json!({ "out": out, "episode": episode.id() }), &text)?;
+    print_result(format, &json!({ "out": json_path(out), "episode": episode.id() }), &text)?;
     Ok(ExitStatus::Success)
 }
 
@@ -146,7 +147,7 @@ fn generate(task: TaskId, split: &Split, out: &Path, format: OutputFormat) -> Re
     }
     bar.finish_and_clear();
     let text = format!("{}: {} of {task}\n", out.display(), counted(n, "episode"));
-    print_result(format, &json!({ "out": out, "task": task, "episodes": n }), &text)?;
+    print_result(format, &json!({ "out": json_path(out), "task": task, "episodes": n }), &text)?;
     Ok(ExitStatus::Success)
 }
 
@@ -173,7 +174,7 @@ fn validate_split(split: &Split, format: OutputFormat) -> Result<ExitStatus> {
     for (task, episode) in TaskId::all().flat_map(|t| episodes(split, t).map(move |e| (t, e))) {
         if stop.load(Ordering::Relaxed) {
             bar.finish_and_clear();
-            print_error(&format!("stopped after {done} of {n} episodes"));
+            print_error(&format!("stopped after {done} of {}", counted(n, "episode")));
             return Ok(ExitStatus::Interrupted);
         }
         let lines: Vec<String> = match &episode {

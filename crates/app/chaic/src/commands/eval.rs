@@ -1,5 +1,6 @@
 //! `chaic eval` without a subcommand: plays a benchmark.
 
+use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Result;
@@ -9,9 +10,9 @@ use chaic_page::REPORT_FILE;
 use chaic_sandbox::Launcher;
 
 use super::eval_partners;
-use super::eval_session::{Played, Session, free_folder, request, write_reports};
+use super::eval_session::{Played, Session, in_free_folder, request, write_reports};
 use super::given_partners::{GivenPartners, is_partner_file};
-use super::summary::{print_scores, report_of};
+use super::summary::{LineValue, print_scores, report_of};
 use crate::arguments::EvalArguments;
 use crate::exit::ExitStatus;
 use crate::output::{OutputFormat, counted, print_error, quoted, quoted_path};
@@ -32,13 +33,17 @@ pub fn run(
     let hint = hint.map_or(String::new(), |name| format!(" --partner {}", quoted(name)));
     let arguments = &EvalArguments { partner, ..arguments.clone() };
     let (request, name) = request(arguments);
-    let path = arguments.out.clone().map_or_else(|| free_folder(name), Ok)?;
-    if arguments.resume {
-        RunFolder::check_started(&path)?;
+    if let Some(path) = resumed {
+        RunFolder::check_started(path)?;
     }
     let session = Session::new(arguments, launcher, given, hint)?;
     let start = Instant::now();
-    match session.play(arguments, &path, &request, None)? {
+    let play = |path: &Path| session.play(arguments, path, &request, None);
+    let played = match &arguments.out {
+        Some(path) => play(path),
+        None => in_free_folder(name, play),
+    };
+    match played? {
         Played::Whole(run) => finish(&run, format, start),
         Played::Part(run) => {
             print_error(&format!(
@@ -46,7 +51,7 @@ pub fn run(
                 session.shard,
                 run.progress().finished,
                 counted(run.progress().total, "episode run"),
-                quoted_path(&path),
+                quoted_path(run.folder().path()),
             ));
             Ok(ExitStatus::from_findings(run.progress().errors > 0))
         }
@@ -61,18 +66,20 @@ fn finish(run: &Run, format: OutputFormat, start: Instant) -> Result<ExitStatus>
     let path = quoted_path(run.folder().path());
     let secs = start.elapsed().as_secs();
     let mut more = vec![
-        ("Page", quoted_path(&run.folder().join(REPORT_FILE))),
-        ("Time", format!("{} min {:02} s", secs / 60, secs % 60)),
+        ("Page", LineValue::Path(run.folder().join(REPORT_FILE))),
+        ("Time", LineValue::Text(format!("{} min {:02} s", secs / 60, secs % 60))),
     ];
+    // A failed episode run has no trace.
+    let finished = || run.results().iter().filter(|r| r.summary().is_some());
     // The order of the results depends on how long the episodes took.
-    let of_rhp = run.results().iter().filter(|r| r.key.helper == "rhp").min_by_key(|r| &r.key);
-    let example = of_rhp.or_else(|| run.results().iter().min_by_key(|r| &r.key));
+    let of_rhp = finished().filter(|r| r.key.helper == "rhp").min_by_key(|r| &r.key);
+    let example = of_rhp.or_else(|| finished().min_by_key(|r| &r.key));
     if let Some(example) = example.filter(|_| run.options().traces) {
         let (episode, helper) = (&example.key.episode, &example.key.helper);
         let replay = format!("chaic replay {path} {episode} --helper {helper} --out replay.mp4");
-        more.push(("Replay", replay));
-        more.push(("View", format!("chaic view {path}")));
-        more.push(("Verify", format!("chaic verify {path}")));
+        more.push(("Replay", LineValue::Text(replay)));
+        more.push(("View", LineValue::Text(format!("chaic view {path}"))));
+        more.push(("Verify", LineValue::Text(format!("chaic verify {path}"))));
     }
     print_scores(format, &report, run.folder(), &more)?;
     Ok(ExitStatus::from_findings(run.progress().errors > 0))

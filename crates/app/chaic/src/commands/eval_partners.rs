@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Instant;
 
-use anyhow::Result;
+use anyhow::{Context as _, Result};
 use chaic_env::helper_registry::NONE;
 use chaic_env::partner_suite::{MAX_FILE_BYTES, PartnerSuite, SUITE, SuitePartner};
 use chaic_eval::EvalError;
@@ -14,12 +14,13 @@ use chaic_llm::language::{is_language_helper, is_language_partner};
 use chaic_sandbox::Launcher;
 use serde_json::json;
 
-use super::eval_session::{Played, Session, free_folder, request, write_reports};
+use super::eval_session::{Played, Session, in_free_folder, request, write_reports};
 use super::given_partners::GivenPartners;
+use super::llm::check_partner;
 use crate::arguments::{EvalArguments, LanguageArguments};
 use crate::exit::ExitStatus;
 use crate::output::{
-    OutputFormat, counted, print_error, print_result, print_warning, quoted, quoted_path,
+    OutputFormat, counted, json_path, print_error, print_result, print_warning, quoted, quoted_path,
 };
 
 /// Plays a benchmark with several partners.
@@ -34,13 +35,21 @@ pub(super) fn run(
     let mut files = GivenPartners::default();
     let list = arguments.partners.as_deref();
     let given = list.map(|list| read_partners(list, &mut files)).transpose()?;
-    let path = arguments.out.clone().map_or_else(|| free_folder("partners"), Ok)?;
     let options = list.map_or(String::new(), |list| format!(" --partners {}", quoted(list)));
     let session = Session::new(arguments, launcher, files, options)?;
     let start = Instant::now();
     let folder = match given {
-        Some(suite) if !arguments.resume => start_runs(&session, arguments, &path, suite)?,
-        given => resumed(&path, given.as_ref())?,
+        Some(suite) if !arguments.resume => {
+            let start = |path: &Path| start_runs(&session, arguments, path, suite.clone());
+            match &arguments.out {
+                Some(path) => start(path)?,
+                None => in_free_folder("partners", start)?,
+            }
+        }
+        given => {
+            let path = arguments.out.as_deref().context("--resume needs --out")?;
+            resumed(path, given.as_ref())?
+        }
     };
     let request = if arguments.resume { request(arguments).0 } else { RunRequest::default() };
     let mut is_whole = true;
@@ -89,8 +98,12 @@ pub(super) fn read_partners(list: &str, files: &mut GivenPartners) -> Result<Par
     let suite = PartnerSuite::parse(&read_user_file(path, MAX_FILE_BYTES)?, list)?;
     let mut partners = suite.partners().to_vec();
     for entry in &mut partners {
-        let name = entry.partner.as_deref();
-        entry.partner = name.map(|name| files.resolve(name)).transpose()?;
+        let Some(name) = &entry.partner else { continue };
+        let known = files.resolve(name).and_then(|name| {
+            check_partner(&name)?;
+            Ok(name)
+        });
+        entry.partner = Some(known.with_context(|| format!("{list}: `{}`", entry.name))?);
     }
     PartnerSuite::new(partners).map_err(|problem| EvalError::Options(problem).into())
 }
@@ -115,6 +128,10 @@ fn start_runs(
         session.with_helpers(&part, &run, |helpers, _| {
             Ok(Run::check(&run, &partner_request(&request, entry), helpers)?)
         })?;
+    }
+    // Another command may have taken the folder during these checks.
+    if arguments.out.is_none() && path.exists() {
+        return Err(EvalError::NotEmpty { path: path.to_owned() }.into());
     }
     let folder = SuiteFolder::start(path, suite)?;
     for entry in &partners {
@@ -211,8 +228,8 @@ pub(super) fn print_robustness(
 ) -> Result<()> {
     let robustness = write_robustness(folder)?;
     let json = json!({
-        "run": folder.path(),
-        "report": folder.report_path(),
+        "run": json_path(folder.path()),
+        "report": json_path(&folder.report_path()),
         "robustness": serde_json::to_value(&robustness)?,
     });
     let mut text = robustness.text(chaic_eval::report::Format::Table);

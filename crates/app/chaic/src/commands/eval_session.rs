@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Result, bail};
 use chaic_env::helper_registry::{BuiltInWithPerception, HelperRegistry};
 use chaic_env::recording::RecordedPartners;
+use chaic_eval::EvalError;
 use chaic_eval::report::write_files;
 use chaic_eval::run::{FolderMode, Run, RunRequest, Shard};
 use chaic_learn::helpers::{NamedPolicy, PolicyRegistry};
@@ -88,8 +89,8 @@ impl<'a> Session<'a> {
             warn_of_run(&run, &warnings);
             print_start(&run, path);
             let mut bars = match part {
-                Some(part) => RunBars::for_part(run.progress(), part),
-                None => RunBars::new(run.progress()),
+                Some(part) => RunBars::for_part(&run, part),
+                None => RunBars::new(&run),
             };
             if let Some(language) = language {
                 language.listen(Box::new(bars.line_printer()));
@@ -149,6 +150,7 @@ impl<'a> Session<'a> {
         if arguments.resume {
             commands.check_resumed(path)?;
         }
+        arguments.exec.check_used(arguments.commands().len())?;
         then(&commands, language.as_ref())
     }
 
@@ -243,13 +245,31 @@ pub(super) fn request(arguments: &EvalArguments) -> (RunRequest, &'static str) {
     (request, "eval")
 }
 
-/// Returns the first of `runs/NAME`, `runs/NAME-2`, ... that does not exist.
-pub(super) fn free_folder(name: &str) -> Result<PathBuf> {
+/// Calls a function with the first of `runs/NAME`, `runs/NAME-2`, ... that does not exist, and with the next one
+/// if another command takes that folder first.
+///
+/// # Errors
+/// Those of the function, and if all folders are taken.
+pub(super) fn in_free_folder<T>(
+    name: &str,
+    mut begin: impl FnMut(&Path) -> Result<T>,
+) -> Result<T> {
     /// Limit of the search.
     const MAX_RUNS: u32 = 10_000;
     let numbered = |k: u32| if k == 1 { name.to_owned() } else { format!("{name}-{k}") };
-    let mut candidates = (1..MAX_RUNS).map(|k| Path::new("runs").join(numbered(k)));
-    candidates.find(|p| !p.exists()).context("every runs/... folder is taken; give one with --out")
+    let candidates = (1..MAX_RUNS).map(|k| Path::new("runs").join(numbered(k)));
+    for path in candidates.filter(|path| !path.exists()) {
+        match begin(&path) {
+            Err(error) if is_taken(&error) => {}
+            result => return result,
+        }
+    }
+    bail!("every runs/... folder is taken; give one with --out")
+}
+
+/// Returns whether the folder of a new run is locked or not empty.
+fn is_taken(error: &anyhow::Error) -> bool {
+    matches!(error.downcast_ref(), Some(EvalError::Locked { .. } | EvalError::NotEmpty { .. }))
 }
 
 /// Hides panic messages of workers, which would interrupt the bars. The run records and prints them.
@@ -304,4 +324,33 @@ fn resume_options(arguments: &EvalArguments) -> String {
     let trust = exec_trust.then(|| " --exec-trust".to_owned());
     let sandbox = readable.chain(trust);
     given.chain(granted).chain(times).chain(memory).chain(variables).chain(sandbox).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_next_folder_is_used_if_another_command_takes_the_first() {
+        let name = "a-name-of-this-test";
+        let folder = |end: &str| Path::new("runs").join(format!("{name}{end}"));
+        let mut tried = Vec::new();
+        let used = in_free_folder(name, |path| {
+            tried.push(path.to_owned());
+            let path = path.to_owned();
+            match tried.len() {
+                1 => Err(EvalError::Locked { path }.into()),
+                2 => Err(EvalError::NotEmpty { path }.into()),
+                _ => Ok(path),
+            }
+        });
+        assert_eq!(used.expect("the third is free"), folder("-3"));
+        assert_eq!(tried, ["", "-2", "-3"].map(folder));
+        let mut n_tried = 0;
+        let refused = in_free_folder(name, |_| -> Result<()> {
+            n_tried += 1;
+            bail!("another problem")
+        });
+        assert!(refused.is_err() && n_tried == 1, "other errors end the search");
+    }
 }

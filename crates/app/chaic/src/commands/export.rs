@@ -1,10 +1,12 @@
 //! `chaic export`.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
 use anyhow::{Context as _, Result, bail};
 use chaic_core::TaskId;
+use chaic_env::trace::Header;
 use chaic_episodes::{Episode, Split, SplitError, episodes};
 use chaic_eval::run::{RunFolder, RunOptions};
 use chaic_eval::verify::verify_trace;
@@ -18,7 +20,9 @@ use super::{bars, stopped_without_result};
 use crate::arguments::{EpisodesArguments, ExportCommand, LeRobotArguments};
 use crate::exit::ExitStatus;
 use crate::interrupt;
-use crate::output::{OutputFormat, counted, print_error, print_result, print_warning, quoted_path};
+use crate::output::{
+    OutputFormat, counted, json_path, print_error, print_result, print_warning, quoted_path,
+};
 
 /// Exports recorded episodes, a split or episode files.
 pub fn run(command: &ExportCommand, format: OutputFormat) -> Result<ExitStatus> {
@@ -85,7 +89,7 @@ fn write_episodes(
         return Ok(stopped_without_result());
     }
     let text = format!("{}: {}\n", quoted_path(out), counted(n, "episode"));
-    print_result(format, &json!({ "out": out, "episodes": n }), &text)?;
+    print_result(format, &json!({ "out": json_path(out), "episodes": n }), &text)?;
     if !is_complete {
         print_error("stopped; the folder holds a valid data set of fewer episodes");
         return Ok(ExitStatus::Interrupted);
@@ -101,9 +105,9 @@ fn lerobot(arguments: &LeRobotArguments, format: OutputFormat) -> Result<ExitSta
     if !options.traces {
         return Err(EvalError::NoTraces { path: folder.path().to_owned() }.into());
     }
-    let Selected { traces, n_cut } = select(arguments, &folder, &options)?;
+    let Selected { traces, n_cut, contents } = select(arguments, &folder, &options)?;
     if traces.is_empty() {
-        bail!("{} has no such episodes", folder.path().display());
+        bail!("{} has {}", folder.path().display(), nothing_selected(arguments, n_cut, &contents));
     }
     let stop = interrupt::stop_flag()?;
     let mut writer = LeRobotWriter::create(out, options_of_set)?;
@@ -126,7 +130,9 @@ fn lerobot(arguments: &LeRobotArguments, format: OutputFormat) -> Result<ExitSta
     let n_samples = writer.finish()?;
     let episodes = counted(n as usize, "episode");
     let text = format!("{}: {episodes}, {}\n", quoted_path(out), counted(n_samples, "sample"));
-    let json = json!({ "out": out, "episodes": n, "samples": n_samples, "damaged_traces": n_cut });
+    let json = json!({
+        "out": json_path(out), "episodes": n, "samples": n_samples, "damaged_traces": n_cut,
+    });
     print_result(format, &json, &text)?;
     if (n as usize) < traces.len() {
         print_error("stopped; the folder holds a valid data set of fewer episodes");
@@ -143,6 +149,48 @@ struct Selected {
     traces: Vec<PathBuf>,
     /// Number of traces left out because they are cut off or damaged.
     n_cut: usize,
+    /// Contents of all traces of the run.
+    contents: Contents,
+}
+
+/// Helpers, tasks and agents of traces.
+#[derive(Default)]
+struct Contents {
+    helpers: BTreeSet<String>,
+    tasks: BTreeSet<&'static str>,
+    agents: BTreeSet<&'static str>,
+}
+
+impl Contents {
+    fn add(&mut self, header: &Header) {
+        self.helpers.insert(header.helper.clone());
+        self.tasks.insert(header.task.name());
+        self.agents.extend(header.people.iter().map(|person| person.agent.role_name()));
+    }
+}
+
+/// Says what a run has instead of the traces to export.
+fn nothing_selected(arguments: &LeRobotArguments, n_cut: usize, contents: &Contents) -> String {
+    let LeRobotArguments { agent, helper, task, .. } = arguments;
+    let Contents { helpers, tasks, agents } = contents;
+    if n_cut > 0 {
+        let cut = counted(n_cut, "trace");
+        return format!("no such trace that is whole; {cut} cut off or damaged");
+    }
+    if helpers.is_empty() {
+        return "no trace".to_owned();
+    }
+    let helper = helper.as_ref().map_or(String::new(), |helper| format!(" with helper {helper}"));
+    let task = task.map_or(String::new(), |task| format!(" in {task}"));
+    let helpers: Vec<&str> = helpers.iter().map(String::as_str).collect();
+    let list = |names: &BTreeSet<&str>| names.iter().copied().collect::<Vec<_>>().join(", ");
+    format!(
+        "no trace of the agent {agent}{helper}{task}; its traces have helpers: {}; tasks: {}; \
+         agents: {}",
+        helpers.join(", "),
+        list(tasks),
+        list(agents)
+    )
 }
 
 /// Selects and verifies the traces to export, before anything is written. Fails on an altered trace.
@@ -153,9 +201,10 @@ fn select(
 ) -> Result<Selected> {
     let LeRobotArguments { run, agent, helper, task, .. } = arguments;
     let helpers = RecordedHelpers::new(run, options)?;
-    let mut selected = Selected { traces: Vec::new(), n_cut: 0 };
+    let mut selected = Selected { traces: Vec::new(), n_cut: 0, contents: Contents::default() };
     for path in folder.traces()? {
         let (trace, warnings) = folder.read_trace(&path)?;
+        selected.contents.add(&trace.header);
         let is_wanted = helper.as_ref().is_none_or(|h| *h == trace.header.helper)
             && task.is_none_or(|t| t == trace.header.task)
             && trace.header.people.iter().any(|p| p.agent == *agent);

@@ -24,7 +24,8 @@ use crate::arguments::FidelityArguments;
 use crate::exit::{ExitStatus, with_hint};
 use crate::interrupt;
 use crate::output::{
-    OutputFormat, print_error, print_progress, print_result, print_warning, quoted_path,
+    OutputFormat, counted, json_path, print_error, print_progress, print_result, print_warning,
+    quoted_path,
 };
 
 /// Plays the missing episode runs and writes the document.
@@ -45,8 +46,9 @@ pub fn run(arguments: &FidelityArguments, format: OutputFormat) -> Result<ExitSt
         let parts = requested_parts(&request, &experiment);
         check_build(&experiment, &parts, stop)?;
         let is_complete = play(jobs, &parts, &experiment, stop);
-        if !is_complete.map_err(|error| with_hint(error, &how_to_resume(arguments)))? {
-            print_error(&format!("stopped; {}", how_to_resume(arguments)));
+        let hint = how_to_resume(arguments, &experiment);
+        if !is_complete.map_err(|error| with_hint(error, &hint))? {
+            print_error(&format!("stopped; {hint}"));
             return Ok(ExitStatus::Interrupted);
         }
     }
@@ -98,15 +100,14 @@ fn play(
         let extent = run.progress();
         let name = format!("part {} of {}, {}", k + 1, requested.len(), part.name);
         if extent.finished - extent.errors == extent.total && folder.join("report.md").exists() {
-            print_progress(&format!(
-                "{name}: its {} episode runs are finished already",
-                extent.total
-            ));
+            let runs = counted(extent.total, "episode run");
+            print_progress(&format!("{name}: {runs}, finished already"));
             continue;
         }
         pace.remaining = remaining_runs(experiment, &requested[k..])?;
-        print_progress(&format!("{name}: {} of {} episode runs", extent.finished, extent.total));
-        let mut bars = RunBars::for_part(extent, &name);
+        let total = counted(extent.total, "episode run");
+        print_progress(&format!("{name}: {} of {total}", extent.finished));
+        let mut bars = RunBars::for_part(&run, &name);
         let played = run.play(jobs, &BuiltInHelpers, stop, &mut |event| {
             if let JobEvent::Finished(finished) = event {
                 pace.add(&finished.result.key.helper, finished.time);
@@ -205,22 +206,26 @@ fn finish(
     write_document(ReportInputs { plan: &experiment.plan, parts: &states }, doc)?;
     let missing: usize = states.iter().map(|s| s.missing().len()).sum();
     let broken: usize = states.iter().map(|s| s.n_failed()).sum();
-    let json = json!({ "document": doc, "missing": missing, "failed": broken });
+    let json = json!({ "document": json_path(doc), "missing": missing, "failed": broken });
     print_result(format, &json, &format!("Document: {}\n", doc.display()))?;
     if missing > 0 {
-        let hint = how_to_resume(arguments);
-        print_warning(&format!("{missing} episode runs are missing; {hint}"));
+        let hint = how_to_resume(arguments, experiment);
+        let are = if missing == 1 { "is" } else { "are" };
+        print_warning(&format!("{} {are} missing; {hint}", counted(missing, "episode run")));
     }
     if broken > 0 {
-        print_warning(&format!("{broken} episode runs failed; the document names them"));
+        let runs = counted(broken, "episode run");
+        print_warning(&format!("{runs} failed; the document names them"));
     }
     Ok(ExitStatus::from_findings(missing + broken > 0))
 }
 
-fn how_to_resume(arguments: &FidelityArguments) -> String {
+fn how_to_resume(arguments: &FidelityArguments, experiment: &ExperimentFolder) -> String {
+    let episodes = arguments.episodes.as_deref().filter(|_| !experiment.has_run());
+    let episodes = episodes.map(|folder| format!(" --episodes {}", quoted_path(folder)));
     let doc = arguments.doc.as_deref().map(|doc| format!(" --doc {}", quoted_path(doc)));
     let switches = arguments.switch.as_ref().map(|names| format!(" --switch {}", names.join(",")));
     let out = quoted_path(&arguments.out);
-    let options = [doc, switches].into_iter().flatten().collect::<String>();
+    let options = [episodes, doc, switches].into_iter().flatten().collect::<String>();
     format!("continue with: chaic fidelity --resume --out {out}{options}")
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 use anyhow::Result;
 use chaic_env::helper_registry::{PARTNER_FILES, POLICY, RECORDED};
 use chaic_env::recording::Recordings;
+use chaic_eval::EvalError;
 use chaic_learn::helpers::PartnerPolicy;
 use chaic_learn::partner::recordings::read_recordings;
 
@@ -20,8 +21,12 @@ impl GivenPartners {
     /// the path. Other names are returned unchanged.
     ///
     /// # Errors
-    /// If a file can't be read, or is of another kind.
+    /// If the path is missing, or a file can't be read or is of another kind.
     pub fn resolve(&mut self, name: &str) -> Result<String> {
+        if PARTNER_FILES.contains(&name) {
+            let text = format!("the partner `{name}` has no path after the colon");
+            return Err(EvalError::Options(text).into());
+        }
         if let Some(path) = name.strip_prefix(RECORDED) {
             let recordings = read_recordings(Path::new(path))?;
             let name = recordings.to_string();

@@ -8,10 +8,11 @@ use anyhow::{Context as _, Result};
 use chaic_agents::perception_factory::GroundTruthPerceptionFactory;
 use chaic_env::helper_registry::{BuiltInHelpers, HelperRegistry as _, find};
 use chaic_env::rules::RuleSet;
+use chaic_eval::EvalError;
 use chaic_learn::helpers::PolicyRegistry;
 use chaic_sandbox::Launcher;
 use chaic_subprocess::conformance::{Check, check};
-use chaic_subprocess::serve::serve;
+use chaic_subprocess::serve::serve_with_grants;
 use serde_json::json;
 
 use super::require_text;
@@ -81,11 +82,14 @@ fn serve_helper(arguments: &HelperServeArguments) -> Result<ExitStatus> {
     let perception = Arc::new(GroundTruthPerceptionFactory);
     let helpers = PolicyRegistry::bundled(&BuiltInHelpers, perception);
     let helper = find(&helpers, &arguments.name, rules)?;
-    let mut helper = helper.with_context(|| {
-        format!("none is no helper to serve; name one of {}", helpers.names().join(", "))
-    })?;
+    let Some(mut helper) = helper else {
+        let names = helpers.names().join(", ");
+        let text = format!("none is no helper to serve; name one of {names}");
+        return Err(EvalError::Options(text).into());
+    };
     let name = format!("chaic {} {}", chaic_env::CHAIC_VERSION, arguments.name);
-    serve(&name, helper.agent.as_mut(), &mut stdin().lock(), &mut stdout().lock())
+    let (mut input, mut output) = (stdin().lock(), stdout().lock());
+    serve_with_grants(&name, helper.agent.as_mut(), helper.grants, &mut input, &mut output)
         .context("standard input and output")?;
     Ok(ExitStatus::Success)
 }

@@ -7,7 +7,7 @@ use serde_json::json;
 
 use crate::arguments::{ImportCommand, ImportHalf, OriginalArguments};
 use crate::exit::ExitStatus;
-use crate::output::{OutputFormat, counted, print_error, print_result};
+use crate::output::{OutputFormat, counted, json_path, print_error, print_result};
 
 /// Imports episodes of other projects.
 pub fn run(command: &ImportCommand, format: OutputFormat) -> Result<ExitStatus> {
@@ -38,6 +38,7 @@ fn original(arguments: &OriginalArguments, format: OutputFormat) -> Result<ExitS
     let n = imported.episodes.len();
     let text =
         format!("{}: {}, {} left out\n", out.display(), counted(n, "episode"), skipped.len());
-    print_result(format, &json!({ "out": out, "episodes": n, "left_out": skipped }), &text)?;
+    let json = json!({ "out": json_path(out), "episodes": n, "left_out": skipped });
+    print_result(format, &json, &text)?;
     Ok(ExitStatus::from_findings(!skipped.is_empty()))
 }

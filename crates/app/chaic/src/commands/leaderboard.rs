@@ -12,7 +12,7 @@ use super::sealed::read_commitment;
 use super::submit::verify_evaluation;
 use crate::arguments::{LeaderboardBuildArguments, LeaderboardCommand};
 use crate::exit::ExitStatus;
-use crate::output::{OutputFormat, counted, print_progress, print_result};
+use crate::output::{OutputFormat, counted, json_path, print_progress, print_result};
 
 /// Builds a leaderboard.
 pub fn run(command: &LeaderboardCommand, format: OutputFormat) -> Result<ExitStatus> {
@@ -23,14 +23,14 @@ pub fn run(command: &LeaderboardCommand, format: OutputFormat) -> Result<ExitSta
         return Err(EvalError::Options(problem).into());
     }
     let leaderboard = collect(arguments)?;
-    let [json_path, csv_path] = ["json", "csv"].map(|extension| out.with_extension(extension));
-    write_atomically(&json_path, leaderboard.to_json().as_bytes())?;
-    write_atomically(&csv_path, leaderboard.to_csv().as_bytes())?;
+    let [json_file, csv_file] = ["json", "csv"].map(|extension| out.with_extension(extension));
+    write_atomically(&json_file, leaderboard.to_json().as_bytes())?;
+    write_atomically(&csv_file, leaderboard.to_csv().as_bytes())?;
     write_atomically(out, leaderboard.to_html(&arguments.title).as_bytes())?;
     let refused = &leaderboard.refused;
     let json = json!({
-        "page": out, "json": json_path, "csv": csv_path, "tables": leaderboard.tables.len(),
-        "submissions": leaderboard.n_submissions(), "refused": refused,
+        "page": json_path(out), "json": json_path(&json_file), "csv": json_path(&csv_file),
+        "tables": leaderboard.tables.len(), "submissions": leaderboard.n_submissions(), "refused": refused,
     });
     let mut text: String = refused
         .iter()
@@ -49,6 +49,12 @@ pub fn run(command: &LeaderboardCommand, format: OutputFormat) -> Result<ExitSta
 /// Verifies the evaluations below a folder.
 fn collect(arguments: &LeaderboardBuildArguments) -> Result<Leaderboard> {
     let commitment = arguments.commitment.as_deref().map(read_commitment).transpose()?;
+    if Evaluation::at(&arguments.folder).submission().is_ok() {
+        bail!(
+            "{} is one folder of chaic submit run; name the folder that holds such folders",
+            arguments.folder.display()
+        );
+    }
     let mut builder = LeaderboardBuilder::default();
     let mut n_folders = 0;
     for path in entries(&arguments.folder)? {

@@ -171,7 +171,9 @@ fn rules(format: OutputFormat) -> Result<()> {
 }
 
 fn runs(folder: &Path, format: OutputFormat) -> Result<()> {
-    let found = if folder.exists() { entries(folder)? } else { Vec::new() };
+    // The default folder is missing before the first run.
+    let is_unused = folder == Path::new("runs") && !folder.exists();
+    let found = if is_unused { Vec::new() } else { entries(folder)? };
     let mut paths: Vec<PathBuf> = Vec::new();
     for path in found {
         // A folder with several partners holds a run per partner.

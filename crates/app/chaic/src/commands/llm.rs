@@ -21,9 +21,9 @@ use serde_json::{Value, json};
 
 use super::given_partners::is_partner_file;
 use super::{all_helper_names, all_partner_names, require_text};
-use crate::arguments::{EvalArguments, LanguageArguments, LlmCommand};
+use crate::arguments::{EndpointArguments, EvalArguments, LanguageArguments, LlmCommand};
 use crate::exit::ExitStatus;
-use crate::output::{OutputFormat, print, print_result, print_warning, quoted};
+use crate::output::{OutputFormat, json_path, print, print_result, print_warning, quoted};
 
 /// Returns a stop flag that is never set.
 pub fn never() -> &'static AtomicBool {
@@ -44,18 +44,19 @@ pub fn run(command: &LlmCommand, format: OutputFormat) -> Result<ExitStatus> {
                  configuration file:\n[request]\ntemplates = \"{0}\"\n",
                 out.display()
             );
-            print_result(format, &json!({ "out": out }), &text)?;
+            print_result(format, &json!({ "out": json_path(out) }), &text)?;
         }
         LlmCommand::Show { run, episode, helper, seed, agent, brief } => {
             require_text(format, "chaic llm show")?;
             let detail = if *brief { Detail::Brief } else { Detail::Full };
             print(&record_text(run, episode, helper.as_deref(), *seed, *agent, detail)?)?;
         }
-        LlmCommand::Check { language } => {
+        LlmCommand::Check { endpoint } => {
             require_text(format, "chaic llm check")?;
-            let settings = preset(language).apply_to(settings_file(language)?.unwrap_or_default());
+            let settings = preset(endpoint).apply_to(settings_file(endpoint)?.unwrap_or_default());
             settings.check()?;
-            print(&check::check(&settings)?)?;
+            let answers = check::check(&settings);
+            print(&answers.with_context(|| settings.endpoint.url.clone())?)?;
         }
     }
     Ok(ExitStatus::Success)
@@ -118,8 +119,8 @@ pub fn language(
         || partner.is_some_and(|n| is_language_partner(n));
     let recorded = if arguments.resume { session::settings_of(path)? } else { None };
     if !is_named && recorded.is_none() {
-        let is_given = given.llm.is_some() || given.llm_config.is_some();
-        let is_given = is_given || preset(given) != EndpointPreset::default();
+        let is_given = given.llm.is_some() || given.endpoint.llm_config.is_some();
+        let is_given = is_given || preset(&given.endpoint) != EndpointPreset::default();
         if is_given && arguments.resume {
             let text = "was started without a language model; omit the options of language helpers \
                         to resume it, or choose another --out";
@@ -135,9 +136,10 @@ pub fn language(
     if let Some(run) = &given.llm {
         return Ok(Some(LanguageHelpers::replay(run, stop)?));
     }
-    let settings = match (settings_file(given)?, recorded) {
-        (None, Some(recorded)) => preset(given).apply_to_recorded(path, recorded)?,
-        (file, _) => preset(given).apply_to(file.unwrap_or_default()),
+    let preset = preset(&given.endpoint);
+    let settings = match (settings_file(&given.endpoint)?, recorded) {
+        (None, Some(recorded)) => preset.apply_to_recorded(path, recorded)?,
+        (file, _) => preset.apply_to(file.unwrap_or_default()),
     };
     Ok(Some(LanguageHelpers::live(settings, stop)?))
 }
@@ -152,21 +154,29 @@ fn check_names(arguments: &EvalArguments) -> Result<(), EnvError> {
     if let Some(name) = helpers.find(|name| !valid.contains(name)) {
         return Err(EnvError::UnknownHelper { name, known });
     }
+    arguments.partner.as_deref().map_or(Ok(()), check_partner)
+}
+
+/// Checks the name of a partner. The error lists all names, with those of language models.
+///
+/// # Errors
+/// [`EnvError::UnknownPartner`], or [`EnvError::InvalidPartner`] if parameters are wrong.
+pub(super) fn check_partner(name: &str) -> Result<(), EnvError> {
     let known: Vec<String> = [RULES.to_owned()].into_iter().chain(all_partner_names()).collect();
-    let unlisted = arguments.partner.clone().filter(|name| !known.contains(name));
-    let Some(name) = unlisted.filter(|name| !is_partner_file(name)) else {
+    if is_partner_file(name) || known.iter().any(|partner| partner == name) {
         return Ok(());
-    };
-    match partner_habits(&name) {
+    }
+    match partner_habits(name) {
         Ok(_) => Ok(()),
-        Err(HabitsError::Unknown) => Err(EnvError::UnknownPartner { name, known }),
+        Err(HabitsError::Unknown) => Err(EnvError::UnknownPartner { name: name.to_owned(), known }),
         Err(HabitsError::Invalid(problem)) => Err(EnvError::InvalidPartner { problem }),
     }
 }
 
 /// Returns the options of language helpers that a resumed run needs again.
 pub fn resume_options(given: &LanguageArguments) -> String {
-    let LanguageArguments { endpoint, model, llm_key_env, llm_allow_http, llm_config, llm } = given;
+    let LanguageArguments { endpoint, llm } = given;
+    let EndpointArguments { endpoint, model, llm_key_env, llm_allow_http, llm_config } = endpoint;
     // A configuration file replaces all recorded settings, also the model.
     let model = model.clone().filter(|_| llm_config.is_some());
     let option = |name: &str, value: Option<String>| {
@@ -184,7 +194,7 @@ pub fn resume_options(given: &LanguageArguments) -> String {
     .concat()
 }
 
-fn preset(given: &LanguageArguments) -> EndpointPreset {
+fn preset(given: &EndpointArguments) -> EndpointPreset {
     EndpointPreset {
         url: given.endpoint.clone(),
         model: given.model.clone(),
@@ -193,6 +203,6 @@ fn preset(given: &LanguageArguments) -> EndpointPreset {
     }
 }
 
-fn settings_file(given: &LanguageArguments) -> Result<Option<Settings>> {
+fn settings_file(given: &EndpointArguments) -> Result<Option<Settings>> {
     Ok(given.llm_config.as_deref().map(Settings::read).transpose()?)
 }

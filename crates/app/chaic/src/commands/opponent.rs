@@ -19,11 +19,12 @@ use chaic_learn::visual::helper::VisualWeights;
 use serde_json::json;
 
 use super::datasets::dataset_split;
+use super::output_path::check_output_file;
 use super::{bars, stopped_without_result, write_json};
 use crate::arguments::{CollectOpponentArguments, OpponentArguments, WindowArguments};
 use crate::exit::ExitStatus;
 use crate::interrupt;
-use crate::output::{OutputFormat, print_progress, print_result, quoted_path};
+use crate::output::{OutputFormat, json_path, print_progress, print_result, quoted_path};
 
 /// Largest size of a weight file, bytes.
 const MAX_BYTES: u64 = 1 << 28;
@@ -33,6 +34,7 @@ pub fn collect_windows(
     arguments: &CollectOpponentArguments,
     format: OutputFormat,
 ) -> Result<ExitStatus> {
+    check_output_file(Some(&arguments.out))?;
     let stop = interrupt::stop_flag()?;
     let split = dataset_split(arguments.split);
     let config = collection(&arguments.windows);
@@ -46,12 +48,14 @@ pub fn collect_windows(
         counts.insert(goal.name(), n);
     }
     text += &format!("Windows: {}\n", quoted_path(&arguments.out));
-    print_result(format, &json!({ "windows": arguments.out, "goals": counts }), &text)?;
+    let json = json!({ "windows": json_path(&arguments.out), "goals": counts });
+    print_result(format, &json, &text)?;
     Ok(ExitStatus::Success)
 }
 
 /// Evaluates an opponent model on held-out episodes.
 pub fn evaluate(arguments: &OpponentArguments, format: OutputFormat) -> Result<ExitStatus> {
+    check_output_file(arguments.json.as_deref())?;
     let model = read_model(&arguments.weights)?;
     let stop = interrupt::stop_flag()?;
     let mut config = collection(&arguments.windows);

@@ -1,11 +1,14 @@
 //! `chaic eval detection`, `chaic eval behavior` and `chaic eval tracks`.
 
+use std::path::PathBuf;
+
 use anyhow::Result;
 use chaic_episodes::DatasetSplit;
 use chaic_files::{create_folders, write_atomically};
 use chaic_vision::behavior::Behavior;
 use chaic_vision::behavior::network::TrainedBehavior;
 use chaic_vision::behavior::report::{BehaviorReport, report as behavior_report};
+use chaic_vision::behavior::store::ClipFolder;
 use chaic_vision::coco::{ANNOTATIONS, DETECTIONS, annotate, annotations_json, results};
 use chaic_vision::evaluate::{DetectionReport, MIN_AREA_PX, MIN_FREQUENT_INSTANCES, report};
 use chaic_vision::instances::Instance;
@@ -13,8 +16,10 @@ use chaic_vision::perception_registry::{read_behavior, read_detector};
 use chaic_vision::track_evaluation::{self, EpisodeFailure, Rate, TrackReport};
 use chaic_vision::trained::TrainedDetector;
 use chaic_vision::views::LabeledView;
+use clap::ValueEnum;
 
-use super::datasets::{collect_clips, view_config};
+use super::datasets::{clip_config, collect_clips, view_config};
+use super::output_path::{check_output_file, check_output_folder};
 use super::{bars, jobs, run_perception, stopped_without_result, write_json};
 use crate::arguments::{BehaviorArguments, ClipArguments, DetectionArguments, TracksArguments};
 use crate::exit::ExitStatus;
@@ -26,6 +31,9 @@ pub fn evaluate_detection(
     arguments: &DetectionArguments,
     format: OutputFormat,
 ) -> Result<ExitStatus> {
+    check_output_file(arguments.json.as_deref())?;
+    check_output_file(arguments.error_rates.as_deref())?;
+    check_output_folder(arguments.coco.as_deref())?;
     let detector = match &arguments.weights {
         Some(path) => read_detector(path)?,
         None => TrainedDetector::built_in(),
@@ -53,7 +61,8 @@ pub fn evaluate_detection(
     if let Some(folder) = &arguments.coco {
         let (annotations, results): (Vec<_>, Vec<_>) = records.into_iter().flatten().unzip();
         create_folders(folder)?;
-        let description = format!("{scenes:?} views of chaic, {appearance:?} look");
+        let (scenes, appearance) = (option_name(scenes), option_name(appearance));
+        let description = format!("{scenes} views of chaic, {appearance} look");
         write_atomically(&folder.join(ANNOTATIONS), &annotations_json(&annotations, &description))?;
         let results = serde_json::to_vec(&results.concat()).expect("detections serialize");
         write_atomically(&folder.join(DETECTIONS), &results)?;
@@ -68,13 +77,19 @@ pub fn evaluate_behavior(
     arguments: &BehaviorArguments,
     format: OutputFormat,
 ) -> Result<ExitStatus> {
+    check_output_file(arguments.json.as_deref())?;
     let network = match &arguments.weights {
         Some(path) => read_behavior(path)?,
         None => TrainedBehavior::built_in(),
     };
     let stop = interrupt::stop_flag()?;
     let perception = run_perception::perception_by_name(Some(&arguments.clips.perception), None)?;
-    let clips = collect_clips(&arguments.clips, &*perception, DatasetSplit::Test, None, stop)?;
+    let split = DatasetSplit::Test;
+    let open = |path: &PathBuf| {
+        ClipFolder::open(path, split, &clip_config(&arguments.clips), &*perception)
+    };
+    let folder = arguments.clip_folder.as_ref().map(open).transpose()?;
+    let clips = collect_clips(&arguments.clips, &*perception, split, folder.as_ref(), stop)?;
     let n_threads = jobs(arguments.clips.jobs);
     let report = clips.and_then(|clips| behavior_report(&network, &clips, n_threads, stop));
     let Some(report) = report else { return Ok(stopped_without_result()) };
@@ -85,6 +100,7 @@ pub fn evaluate_behavior(
 
 /// Evaluates the tracks of a perception over whole held-out episodes.
 pub fn evaluate_tracks(arguments: &TracksArguments, format: OutputFormat) -> Result<ExitStatus> {
+    check_output_file(arguments.json.as_deref())?;
     let perception = run_perception::perception_by_name(Some(&arguments.perception), None)?;
     let stop = interrupt::stop_flag()?;
     let bar = bars::count_bar(u64::from(arguments.n_episodes), "episodes");
@@ -112,14 +128,24 @@ pub fn evaluate_tracks(arguments: &TracksArguments, format: OutputFormat) -> Res
     Ok(ExitStatus::from_findings(!report.failures.is_empty()))
 }
 
+/// Formats a value; `/` if it is undefined.
+fn number(value: Option<f64>) -> String {
+    value.map_or_else(|| "/".to_owned(), |x| format!("{x:.3}"))
+}
+
+/// Returns the value of an option as on the command line.
+fn option_name(value: &impl ValueEnum) -> String {
+    value.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+}
+
 fn tracks_text(report: &TrackReport, perception: &str) -> String {
-    let rate = |r: &Rate| format!("{:.3} +- {:.3} of {}", r.value, r.interval, r.n);
+    let rate = |r: &Rate| format!("{} +- {} of {}", number(r.value), number(r.interval), r.n);
     let mut text = format!(
-        "{} episodes, {} images, {perception} perception\n\
+        "{}, {}, {perception} perception\n\
          precision of detections     {}\n\
          recall of visible objects   {}\n",
-        report.episodes,
-        report.images,
+        counted(report.episodes, "episode"),
+        counted(report.images, "image"),
         rate(&report.detection_precision),
         rate(&report.detection_recall)
     );
@@ -139,11 +165,11 @@ fn tracks_text(report: &TrackReport, perception: &str) -> String {
         "identity switches per object {}\n\
          precision of people         {}\n\
          recall of visible people    {}\n\
-         calibration error of confidences {:.3}\n",
+         calibration error of confidences {}\n",
         rate(&report.identity_switches),
         rate(&report.person_precision),
         rate(&report.person_recall),
-        report.calibration_error
+        number(report.calibration_error)
     )
 }
 
@@ -161,17 +187,18 @@ fn behavior_text(report: &BehaviorReport, clips: &ClipArguments) -> String {
         }
     }
     text + &format!(
-        "\n\n{} clips with {} perception, {:?} appearance; columns are predictions\n\
-         top1 {:.3} +- {:.3}; mean of classes {:.3}; calibration error {:.3}\n\
-         mixed clips predicted as moving: {:.3}\n",
-        report.clips,
+        "\n\n{} of {} with {} perception, {} appearance; columns are predictions\n\
+         top1 {} +- {}; mean of classes {}; calibration error {}\n\
+         mixed clips predicted as moving: {}\n",
+        counted(report.clips, "clip"),
+        counted(report.episodes, "episode"),
         clips.perception,
-        clips.appearance,
-        report.top1,
-        report.interval,
-        report.balanced,
-        report.calibration_error,
-        report.mixed_as_moving
+        option_name(&clips.appearance),
+        number(report.top1),
+        number(report.interval),
+        number(report.balanced),
+        number(report.calibration_error),
+        number(report.mixed_as_moving)
     )
 }
 
@@ -192,21 +219,28 @@ fn detection_text(report: &DetectionReport, arguments: &DetectionArguments) -> S
         errors,
         ..
     } = report;
+    let means = |map50: &Option<f64>, map: &Option<f64>| {
+        format!("map50 {}, map {}", number(*map50), number(*map))
+    };
     text += &format!(
-        "\n{views} {:?} views, {:?} appearance, instances of at least {MIN_AREA_PX} pixels: map50 \
-         {map50:.3}, map {map:.3}\n",
-        arguments.scenes, arguments.appearance
+        "\n{}, {} appearance, instances of at least {MIN_AREA_PX} pixels: {}\n",
+        counted(*views, &format!("{} view", option_name(&arguments.scenes))),
+        option_name(&arguments.appearance),
+        means(map50, map)
     );
     for (px, [map50, map]) in smaller {
-        text += &format!("instances of at least {px} pixels: map50 {map50:.3}, map {map:.3}\n");
+        text += &format!("instances of at least {px} pixels: {}\n", means(map50, map));
     }
     for (size, [map50, map]) in sizes {
-        text += &format!("{size} instances: map50 {map50:.3}, map {map:.3}\n");
+        text += &format!("{size} instances: {}\n", means(map50, map));
     }
     let (of_frequent, n_frequent) = map50_of_frequent;
+    let classes = if *n_frequent == 1 { "class" } else { "classes" };
     text += &format!(
-        "{n_frequent} classes with at least {MIN_FREQUENT_INSTANCES} instances: map50 {of_frequent:.3}\n\
-         calibration error of scores: {calibration_error:.3}\n"
+        "{n_frequent} {classes} with at least {MIN_FREQUENT_INSTANCES} instances: map50 {}\n\
+         calibration error of scores: {}\n",
+        number(*of_frequent),
+        number(*calibration_error)
     );
     text += &format!(
         "at score 0.5: found {}, poor mask {}, wrong class {}, merged {}, missed {}; false \

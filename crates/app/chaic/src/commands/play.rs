@@ -11,7 +11,7 @@ use serde_json::json;
 
 use crate::arguments::PlayArguments;
 use crate::exit::ExitStatus;
-use crate::output::{OutputFormat, counted, print_result, quoted_path};
+use crate::output::{OutputFormat, counted, json_path, print_result, quoted_path};
 
 /// Helper that is selected when the page opens.
 const FIRST_HELPER: &str = "infer";
@@ -29,7 +29,7 @@ pub fn run(arguments: &PlayArguments, format: OutputFormat) -> Result<ExitStatus
     let size = format!("{:.1} MB", page.len() as f64 / 1e6);
     let (n, path) = (counted(ids.len(), "episode"), quoted_path(out));
     let text = format!("{n} in {path} ({size}); open it in a browser\n");
-    let json = json!({ "out": out, "episodes": ids, "bytes": page.len() });
+    let json = json!({ "out": json_path(out), "episodes": ids, "bytes": page.len() });
     print_result(format, &json, &text)?;
     Ok(ExitStatus::Success)
 }

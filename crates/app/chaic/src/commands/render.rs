@@ -8,7 +8,7 @@ use serde_json::json;
 
 use crate::arguments::RenderArguments;
 use crate::exit::ExitStatus;
-use crate::output::{OutputFormat, print_result};
+use crate::output::{OutputFormat, json_path, print_result};
 
 /// Renders one frame of an episode.
 pub fn run(arguments: &RenderArguments, format: OutputFormat) -> Result<ExitStatus> {
@@ -28,7 +28,9 @@ pub fn run(arguments: &RenderArguments, format: OutputFormat) -> Result<ExitStat
     let rendered = frame_export::write(&export, &BuiltInHelpers, out)?;
     let id = episode.id();
     let text = format!("{}: view of the {agent} in {id} at frame {rendered}\n", out.display());
-    let json = json!({ "out": out, "episode": id, "agent": agent.role_name(), "frame": rendered });
+    let json = json!({
+        "out": json_path(out), "episode": id, "agent": agent.role_name(), "frame": rendered,
+    });
     print_result(format, &json, &text)?;
     Ok(ExitStatus::Success)
 }

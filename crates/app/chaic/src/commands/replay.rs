@@ -18,7 +18,7 @@ use super::recorded::{RecordedEpisode, read_recorded};
 use crate::arguments::ReplayArguments;
 use crate::exit::ExitStatus;
 use crate::interrupt;
-use crate::output::{OutputFormat, counted, print_error, print_result};
+use crate::output::{OutputFormat, counted, json_path, print_error, print_result};
 
 /// Makes a video of a recorded episode.
 pub fn run(arguments: &ReplayArguments, format: OutputFormat) -> Result<ExitStatus> {
@@ -51,8 +51,8 @@ pub fn run(arguments: &ReplayArguments, format: OutputFormat) -> Result<ExitStat
     let n = counted(images as usize, "image");
     let text = format!("{}: {n} of {} with {}\n", out.display(), key.episode, key.helper);
     let json = json!({
-        "out": out, "images": images, "episode": key.episode, "helper": key.helper, "seed": key.seed,
-        "complete": is_whole,
+        "out": json_path(out), "images": images, "episode": key.episode, "helper": key.helper,
+        "seed": key.seed, "complete": is_whole,
     });
     print_result(format, &json, &text)?;
     // The video of a cut-off trace shows only the recorded part.

@@ -1,8 +1,10 @@
 //! `chaic report`.
 
-use std::path::Path;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
+use chaic_env::RunKey;
 use chaic_eval::EvalError;
 use chaic_eval::calibration::read_scores;
 use chaic_eval::losses::Losses;
@@ -119,7 +121,8 @@ fn report_beliefs(folder: &RunFolder, options: &RunOptions, format: Format) -> R
     warnings.iter().for_each(|warning| print_warning(warning));
     if scores.helpers.is_empty() {
         anyhow::bail!(
-            "{} has no whole trace with a belief about a target set; helpers such as infer record one",
+            "{} has no whole trace with a belief about a target set; helpers such as infer record \
+             one, except in moving_house, which has a single target set",
             folder.path().display()
         );
     }
@@ -135,12 +138,32 @@ fn from_journal(folder: &RunFolder, planned: &[EpisodeJob]) -> Result<Vec<RunRes
     Ok(results)
 }
 
+/// Returns the results of the traces, and those of failed episode runs. Leaves out traces that the
+/// run does not play or that are of another episode run than their name says, with a warning.
 fn from_traces(folder: &RunFolder, planned: &[EpisodeJob]) -> Result<Vec<RunResult>> {
+    let paths: BTreeSet<PathBuf> = planned.iter().map(|job| folder.trace(&job.key)).collect();
     let mut results = Vec::new();
     for path in folder.traces()? {
+        let shown = path.display();
+        // An empty plan is unknown.
+        if !paths.is_empty() && !paths.contains(&path) {
+            print_warning(&format!(
+                "{shown}: this run doesn't play that episode run, so its trace is left out"
+            ));
+            continue;
+        }
         let (trace, warnings) = folder.read_trace(&path)?;
         for warning in warnings {
             print_warning(&warning.to_string());
+        }
+        let key = trace.header.key();
+        if folder.trace(&key) != path {
+            let RunKey { helper, episode, seed, .. } = key;
+            print_warning(&format!(
+                "{shown}: it is the trace of {episode} with {helper} and seed {seed}, so it is left \
+                 out"
+            ));
+            continue;
         }
         results.extend(tally(&trace));
     }

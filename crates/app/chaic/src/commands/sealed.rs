@@ -13,7 +13,7 @@ use serde_json::json;
 use super::bars;
 use crate::exit::ExitStatus;
 use crate::interrupt;
-use crate::output::{OutputFormat, counted, print_error, print_result};
+use crate::output::{OutputFormat, counted, json_path, print_error, print_result};
 
 /// File of the commitment in the folder of a sealed split.
 const COMMITMENT: &str = "commitment.json";
@@ -67,9 +67,9 @@ pub(super) fn seal(
     let path = out.join(COMMITMENT);
     write_atomically(&path, commitment.to_json().as_bytes())?;
     let json = json!({
-        "split": split.name(), "episodes": split.n_total(), "secret": secret_path,
-        "commitment": path, "folder": episodes,
-        "partners": partners.as_ref().map(|(path, _)| path),
+        "split": split.name(), "episodes": split.n_total(), "secret": json_path(secret_path),
+        "commitment": json_path(&path), "folder": json_path(&episodes),
+        "partners": partners.as_ref().map(|(path, _)| json_path(path)),
     });
     let partners = partners.map_or_else(String::new, |(path, suite)| {
         format!("{}: {}\n", path.display(), counted(suite.partners().len(), "partner"))
@@ -118,7 +118,9 @@ pub(super) fn open(
     if let Some((path, suite)) = partners.zip(suite) {
         write_atomically(path, suite.to_json().as_bytes())?;
     }
-    let json = json!({ "split": split.name(), "episodes": split.n_total(), "folder": out });
+    let json = json!({
+        "split": split.name(), "episodes": split.n_total(), "folder": json_path(out),
+    });
     let text = format!(
         "{}: {} of {}, the committed ones\n",
         out.display(),

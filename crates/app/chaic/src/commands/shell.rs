@@ -1,7 +1,5 @@
 //! `chaic completions` and `chaic man`.
 
-use std::path::PathBuf;
-
 use anyhow::{Context as _, Result};
 use chaic_files::{create_folders, write_atomically};
 use clap::Command;
@@ -12,7 +10,7 @@ use serde_json::json;
 use super::require_text;
 use crate::arguments::{CompletionsArguments, ManArguments, command};
 use crate::exit::ExitStatus;
-use crate::output::{OutputFormat, counted, print, print_result};
+use crate::output::{OutputFormat, counted, json_path, print, print_result};
 
 /// Prints a completion script.
 pub fn completions(arguments: &CompletionsArguments, format: OutputFormat) -> Result<ExitStatus> {
@@ -34,7 +32,7 @@ pub fn man(arguments: &ManArguments, format: OutputFormat) -> Result<ExitStatus>
     for (name, page) in &pages {
         write_atomically(&folder.join(name), page)?;
     }
-    let paths: Vec<PathBuf> = pages.iter().map(|(name, _)| folder.join(name)).collect();
+    let paths: Vec<String> = pages.iter().map(|(name, _)| json_path(&folder.join(name))).collect();
     let text = format!(
         "{}: {}; read them with: man -l {}\n",
         folder.display(),

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::summary::{scores_json, scores_text};
 use crate::arguments::ShowArguments;
 use crate::exit::ExitStatus;
-use crate::output::{OutputFormat, print_result, print_warning, quoted_path};
+use crate::output::{OutputFormat, counted, json_path, print_result, print_warning, quoted_path};
 
 /// Split of a run of episode files, as in `run.json`.
 const FILES_SPLIT: &str = "files";
@@ -42,7 +42,7 @@ pub fn run(arguments: &ShowArguments, format: OutputFormat) -> Result<ExitStatus
         formulas: FormulaSet::Paper,
     };
     let json = json!({
-        "run": folder.path(),
+        "run": json_path(folder.path()),
         "options": options,
         "episode_runs": {
             "planned": progress.planned, "finished": progress.finished, "failed": progress.failed,
@@ -72,14 +72,17 @@ struct Progress {
 /// Formats the options that differ from the default, and the progress.
 fn options_text(options: &RunOptions, progress: &Progress, n_traces: usize) -> String {
     let RunOptions { split, seeds, rules, rule_overrides, traces, track, .. } = options;
-    let episodes = options.n_episodes;
-    let episodes =
-        episodes.map_or("all episodes".to_owned(), |n| format!("the first {n} episodes"));
+    let episodes = match options.n_episodes {
+        None => "all episodes".to_owned(),
+        Some(1) => "the first episode".to_owned(),
+        Some(n) => format!("the first {n} episodes"),
+    };
     let split =
         if split == FILES_SPLIT { "episode files".to_owned() } else { format!("split {split}") };
     let tasks: Vec<&str> = options.tasks.iter().map(|task| task.name()).collect();
     let rules = [&[rules.to_string()], &rule_overrides[..]].concat().join(", ");
     let Progress { planned, finished, failed } = progress;
+    let total = counted(*planned, "episode run");
     let optional = |label: &'static str, value: Option<String>| value.map(|value| (label, value));
     let lines = [
         Some(("Tasks", tasks.join(", "))),
@@ -93,7 +96,7 @@ fn options_text(options: &RunOptions, progress: &Progress, n_traces: usize) -> S
         optional("Perception", options.perception.clone()),
         optional("Behavior", options.behavior.clone()),
         optional("Appearance", options.appearance.clone()),
-        Some(("Finished", format!("{finished} of {planned} episode runs, failed: {failed}"))),
+        Some(("Finished", format!("{finished} of {total}, failed: {failed}"))),
         Some(("Traces", if *traces { n_traces.to_string() } else { "not recorded".to_owned() })),
     ];
     let line = |(label, value)| format!("{:12}{value}\n", format!("{label}:"));

@@ -1,6 +1,6 @@
 //! `chaic study`.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use chaic_core::AgentId;
@@ -20,7 +20,7 @@ use crate::arguments::{
     StudyExportArguments,
 };
 use crate::exit::ExitStatus;
-use crate::output::{OutputFormat, counted, print_result, print_warning, quoted_path};
+use crate::output::{OutputFormat, counted, json_path, print_result, print_warning, quoted_path};
 
 /// Sampling interval of LeRobot data sets, frames, and side of their images, pixels: the defaults of
 /// `chaic export lerobot`.
@@ -141,7 +141,9 @@ fn build(arguments: &StudyBuildArguments, format: OutputFormat) -> Result<ExitSt
         &plan.digest()[..8],
         counted(slots as usize, "slot"),
     );
-    let json = json!({ "out": out, "digest": plan.digest(), "slots": slots, "bytes": page.len() });
+    let json = json!({
+        "out": json_path(out), "digest": plan.digest(), "slots": slots, "bytes": page.len(),
+    });
     print_result(format, &json, &text)?;
     Ok(ExitStatus::Success)
 }
@@ -173,7 +175,7 @@ fn export_data(arguments: &StudyExportArguments, format: OutputFormat) -> Result
         counted(report.traces, "trace"),
     );
     let json = json!({
-        "out": out, "participants": report.participants, "completed": report.completed,
+        "out": json_path(out), "participants": report.participants, "completed": report.completed,
         "traces": report.traces, "verified": report.verified.len(), "problems": report.problems,
         "open_slots": report.open_slots,
     });
@@ -228,8 +230,10 @@ fn delete_participant(
         counted(deleted.files.len(), "file"),
         counted(deleted.rows, "row"),
     );
+    let paths = |paths: &[PathBuf]| paths.iter().map(|path| json_path(path)).collect::<Vec<_>>();
     let json = json!({
-        "files": deleted.files, "rows": deleted.rows, "unsearched": deleted.unsearched,
+        "files": paths(&deleted.files), "rows": deleted.rows,
+        "unsearched": paths(&deleted.unsearched),
     });
     print_result(format, &json, &text)?;
     Ok(ExitStatus::from_findings(!deleted.unsearched.is_empty()))

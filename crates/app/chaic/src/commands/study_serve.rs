@@ -21,7 +21,9 @@ pub fn run(
     use serde_json::json;
 
     use crate::interrupt;
-    use crate::output::{counted, print_progress, print_result, print_warning, quoted_path};
+    use crate::output::{
+        counted, json_path, print_progress, print_result, print_warning, quoted_path,
+    };
 
     let StudyServeArguments { study, data, listen, hosts, .. } = arguments;
     let plan = StudyPlan::new(Study::read(study)?, study)?;
@@ -52,7 +54,7 @@ pub fn run(
         counts.complete,
     );
     let json = json!({
-        "url": url, "digest": digest, "slots": slots, "data": data,
+        "url": url, "digest": digest, "slots": slots, "data": json_path(data),
         "participants": counts.participants, "completed": counts.complete,
     });
     print_result(format, &json, &text)?;
@@ -122,6 +124,7 @@ mod own_helpers {
                 }
             }
         }
+        arguments.exec.check_used(programs.len())?;
         for name in given.iter().flat_map(|helper| helper.names()) {
             if !plan.helpers().contains(name.as_str()) {
                 let problem = "no condition of the study has the helper";

@@ -17,7 +17,7 @@ use chaic_env::helper_registry::NONE;
 use chaic_env::partner_suite::SUITE;
 use chaic_eval::metrics::Score;
 use chaic_eval::report::rounded;
-use chaic_eval::run::{RunFolder, RunRequest};
+use chaic_eval::run::{RunFolder, RunRequest, tasks_of_files};
 use chaic_files::write_atomically;
 use chaic_sandbox::Launcher;
 use chaic_subprocess::conformance::check;
@@ -37,7 +37,7 @@ use crate::arguments::{
 };
 use crate::exit::ExitStatus;
 use crate::interrupt;
-use crate::output::{OutputFormat, counted, print, print_result};
+use crate::output::{OutputFormat, counted, json_path, print, print_result};
 
 /// Helper that plays as the reference with `--rhp`.
 const RHP: &str = "rhp";
@@ -62,7 +62,7 @@ fn pack_folder(arguments: &SubmitPackArguments, format: OutputFormat) -> Result<
     Submission::read(&arguments.folder)?;
     let packed = pack(&arguments.folder, &arguments.out)?;
     let json = json!({
-        "archive": arguments.out, "files": packed.n_files, "bytes": packed.bytes,
+        "archive": json_path(&arguments.out), "files": packed.n_files, "bytes": packed.bytes,
         "sha256": packed.sha256,
     });
     let text = format!(
@@ -191,6 +191,8 @@ fn play(
     let list = arguments.partners.as_deref();
     let mut files = GivenPartners::default();
     let partners = list.map(|list| read_partners(list, &mut files)).transpose()?;
+    // A wrong folder of episodes leaves no submission behind.
+    tasks_of_files(&arguments.episodes)?;
     let evaluation = Evaluation::at(&arguments.out);
     let submission = evaluation.add_submission(&arguments.submission)?;
     let run = evaluation.run_folder();
@@ -236,7 +238,7 @@ fn score(arguments: &SubmitScoreArguments, format: OutputFormat) -> Result<ExitS
     write_atomically(&path, score.to_json().as_bytes())?;
     let rates = mean_rates(&score, &score.tasks);
     let mut json = json!({
-        "score": path, "helper": score.submission.name, "tr": rates_json(&rates),
+        "score": json_path(&path), "helper": score.submission.name, "tr": rates_json(&rates),
     });
     let mut text = format!(
         "{}: transport rate, mean over {}: {}\n",
@@ -309,12 +311,13 @@ fn verify(arguments: &SubmitVerifyArguments, format: OutputFormat) -> Result<Exi
 /// Verifies an evaluated submission on several threads, with a bar.
 ///
 /// # Errors
-/// Those of [`Evaluation::verify`].
+/// Those of [`Evaluation::check_parts`] and [`Evaluation::verify`].
 pub(super) fn verify_evaluation(
     evaluation: &Evaluation,
     commitment: Option<&Commitment>,
     jobs: usize,
 ) -> Result<EvaluationReport> {
+    evaluation.check_parts()?;
     let runs = evaluation.partner_runs()?;
     let ordinary = runs.first().expect("every evaluation has the run with the ordinary partner");
     // The runs differ in the partner only, so they have the same helpers.

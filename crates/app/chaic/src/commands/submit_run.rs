@@ -18,7 +18,7 @@ use super::eval_session::warn_of_run;
 use super::summary::report_of;
 use crate::exit::{ExitStatus, with_hint};
 use crate::output::{
-    OutputFormat, counted, print_error, print_progress, print_result, quoted_path,
+    OutputFormat, counted, json_path, print_error, print_progress, print_result, quoted_path,
 };
 
 /// Plays the runs of a submission. Each of them continues after an interruption.
@@ -95,7 +95,7 @@ impl SubmissionPlayer<'_> {
         );
         let json = json!({
             "partners": n_partners,
-            "report": folder.report_path(),
+            "report": json_path(&folder.report_path()),
             "robustness": serde_json::to_value(&robustness)?,
         });
         let tables = robustness.text(Format::Table) + "\n";
@@ -120,8 +120,8 @@ impl SubmissionPlayer<'_> {
             run.options().helpers.join(", ")
         ));
         let mut bars = match part {
-            Some(part) => RunBars::for_part(extent, part),
-            None => RunBars::new(extent),
+            Some(part) => RunBars::for_part(&run, part),
+            None => RunBars::new(&run),
         };
         let played = run.play(self.jobs, self.registry, self.stop, &mut |event| bars.show(event));
         bars.clear();
@@ -151,7 +151,8 @@ impl SubmissionPlayer<'_> {
         more: Value,
     ) -> Result<ExitStatus> {
         let RunProgress { total, errors, .. } = extent;
-        let mut json = json!({ "run": self.run, "episode_runs": total, "failed": errors });
+        let mut json =
+            json!({ "run": json_path(self.run), "episode_runs": total, "failed": errors });
         for (name, value) in more.as_object().into_iter().flatten() {
             json[name] = value.clone();
         }

@@ -1,6 +1,6 @@
 //! Short report of a run for a terminal: one table, the grants of each helper, and paths.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use chaic_core::TaskId;
@@ -11,7 +11,7 @@ use chaic_eval::report::{Format, Labels, Report, rounded, shown_interval};
 use chaic_eval::run::{Run, RunFolder};
 use serde_json::{Value, json};
 
-use crate::output::{OutputFormat, counted, print_result, quoted_path};
+use crate::output::{OutputFormat, counted, json_path, print_result, quoted_path};
 
 /// Largest number of lines of the short report.
 const MAX_LINES: usize = 40;
@@ -40,6 +40,30 @@ pub fn scores_json(report: &Report<'_>) -> Result<Value> {
     Ok(serde_json::from_str(&report.text(Format::Json))?)
 }
 
+/// Value of a further line of the short report.
+pub enum LineValue {
+    /// A path, which the text quotes for a shell.
+    Path(PathBuf),
+    /// Any other text.
+    Text(String),
+}
+
+impl LineValue {
+    fn json(&self) -> String {
+        match self {
+            LineValue::Path(path) => json_path(path),
+            LineValue::Text(text) => text.clone(),
+        }
+    }
+
+    fn text(&self) -> String {
+        match self {
+            LineValue::Path(path) => quoted_path(path),
+            LineValue::Text(text) => text.clone(),
+        }
+    }
+}
+
 /// Prints the scores of a run with the paths of its report and folder. `more` are further lines, as label and value.
 ///
 /// # Errors
@@ -48,25 +72,30 @@ pub fn print_scores(
     format: OutputFormat,
     report: &Report<'_>,
     folder: &RunFolder,
-    more: &[(&str, String)],
+    more: &[(&str, LineValue)],
 ) -> Result<()> {
     let path = folder.join("report.md");
-    let mut json = json!({ "run": folder.path(), "report": path });
+    let mut json = json!({ "run": json_path(folder.path()), "report": json_path(&path) });
     for (label, value) in more {
-        json[label.to_lowercase()] = Value::from(value.as_str());
+        json[label.to_lowercase()] = Value::from(value.json());
     }
     json["scores"] = scores_json(report)?;
     print_result(format, &json, &scores_text(report, folder.path(), more))
 }
 
 /// Formats the short report: at most [`MAX_LINES`] lines of [`MAX_COLUMNS`] characters.
-pub fn scores_text(report: &Report<'_>, folder: &Path, more: &[(&str, String)]) -> String {
+pub fn scores_text(report: &Report<'_>, folder: &Path, more: &[(&str, LineValue)]) -> String {
     let scores = report.scores();
     let helpers = scores.helpers();
     let mut footer = notes(report, &scores);
-    let paths = [("Report", quoted_path(&folder.join("report.md"))), ("Run", quoted_path(folder))];
+    let paths = [
+        ("Report", LineValue::Path(folder.join("report.md"))),
+        ("Run", LineValue::Path(folder.to_owned())),
+    ];
     let labeled = paths.iter().chain(more);
-    footer.extend(labeled.map(|(label, value)| format!("{:8} {value}", format!("{label}:"))));
+    let line =
+        |(label, value): &(&str, LineValue)| format!("{:8} {}", format!("{label}:"), value.text());
+    footer.extend(labeled.map(line));
     let lines_of = |n_helpers: usize| {
         let shown = &helpers[..n_helpers];
         let mut lines = table(&scores, report.labels(), shown);
@@ -157,11 +186,39 @@ fn split_title(title: &str) -> [String; 2] {
     [first.to_owned(), second.to_owned()]
 }
 
-/// Splits a long name into two lines of the column of helpers, and shortens a longer one.
+/// Splits a long name into two lines of the column of helpers, at a space if both parts fit, and shortens a
+/// longer one.
 fn wrapped_name(name: &str) -> [String; 2] {
+    let fits = |text: &str| text.chars().count() <= HELPER_COLUMNS;
+    if fits(name) {
+        return [name.to_owned(), String::new()];
+    }
+    let splits = name.match_indices(' ').map(|(at, _)| (&name[..at], &name[at + 1..]));
+    if let Some((first, rest)) = splits.rev().find(|(first, rest)| fits(first) && fits(rest)) {
+        return [first.to_owned(), rest.to_owned()];
+    }
     let chars: Vec<char> = shortened(name, 2 * HELPER_COLUMNS).chars().collect();
     let (first, rest) = chars.split_at(chars.len().min(HELPER_COLUMNS));
     [first.iter().collect(), rest.iter().collect()]
+}
+
+/// Splits a text at spaces into lines of at most [`MAX_COLUMNS`] characters. Further lines are indented, and
+/// a longer word is shortened.
+fn wrapped_text(text: &str) -> Vec<String> {
+    const INDENT: &str = "  ";
+    let mut lines = Vec::new();
+    let mut line = String::new();
+    for word in text.split(' ') {
+        let is_first_word = line.trim_start().is_empty();
+        if !is_first_word && line.chars().count() + 1 + word.chars().count() > MAX_COLUMNS {
+            lines.push(std::mem::replace(&mut line, format!("{INDENT}{word}")));
+        } else {
+            line += if is_first_word { "" } else { " " };
+            line += word;
+        }
+    }
+    lines.push(line);
+    lines.iter().map(|line| shortened(line, MAX_COLUMNS)).collect()
 }
 
 /// Shortens a text to this number of characters.
@@ -172,12 +229,13 @@ fn shortened(text: &str, max: usize) -> String {
     text.chars().take(max - 1).chain(['\u{2026}']).collect()
 }
 
-/// Returns a line with the grants of each helper, and one for the partner if it has more than the default.
+/// Returns the grants of each helper, and those of the partner if it has more than the default. Each begins on
+/// a line of its own.
 fn grants(report: &Report<'_>, helpers: &[String]) -> Vec<String> {
     let labels = report.labels();
     let helpers = helpers.iter().filter(|helper| *helper != NONE);
     let each = helpers.map(|helper| format!("Granted: {}", labels.title(helper)));
-    each.chain(labels.sentence(&[])).map(|line| shortened(&line, MAX_COLUMNS)).collect()
+    each.chain(labels.sentence(&[])).flat_map(|text| wrapped_text(&text)).collect()
 }
 
 /// Returns the lines that qualify the scores, such as the number of failed episode runs.
@@ -187,7 +245,8 @@ fn notes(report: &Report<'_>, scores: &Scores) -> Vec<String> {
     let mut notes = Vec::new();
     if n_failed > 0 {
         let runs = counted(n_failed, "episode run");
-        notes.push(format!("* {runs} failed and count as zero; report.md has the reasons."));
+        let count = if n_failed == 1 { "counts" } else { "count" };
+        notes.push(format!("* {runs} failed and {count} as zero; report.md has the reasons."));
     }
     let (n_planned, n_results) = (report.planned.len(), report.results.len());
     if n_results < n_planned {
@@ -214,9 +273,33 @@ mod tests {
     fn names_of_any_length_fit_into_their_column() {
         assert_eq!(wrapped_name("RHP"), ["RHP", ""]);
         assert_eq!(wrapped_name("my-trained-policy"), ["my-trained-", "policy"]);
+        assert_eq!(wrapped_name("Infer, known goal"), ["Infer,", "known goal"]);
+        assert_eq!(wrapped_name("Ideal observer"), ["Ideal", "observer"]);
+        assert_eq!(wrapped_name("a b c d e f g h"), ["a b c d e f", "g h"]);
         let [first, rest] = wrapped_name(&"x".repeat(40));
         assert_eq!((first.len(), rest.chars().count()), (11, 11));
         assert!(rest.ends_with('\u{2026}'), "{rest}");
+    }
+
+    #[test]
+    fn names_of_built_in_helpers_are_split_at_spaces() {
+        for helper in &chaic_agents::HELPERS {
+            let [first, rest] = wrapped_name(helper.title);
+            assert_eq!(format!("{first} {rest}").trim_end(), helper.title);
+        }
+    }
+
+    #[test]
+    fn long_texts_are_split_and_keep_their_words() {
+        let text = format!("Granted: Oracle ({})", ["goal place"; 20].join(", "));
+        let lines = wrapped_text(&text);
+        assert!(lines.len() == 3 && lines[1].starts_with("  goal"), "{lines:?}");
+        assert!(lines.iter().all(|line| line.chars().count() <= MAX_COLUMNS), "{lines:?}");
+        let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+        assert_eq!(words(&lines.join(" ")), words(&text));
+        assert_eq!(wrapped_text("Granted: RHP"), ["Granted: RHP"]);
+        let lines = wrapped_text(&"x".repeat(200));
+        assert_eq!((lines.len(), lines[0].chars().count()), (1, MAX_COLUMNS));
     }
 
     #[test]

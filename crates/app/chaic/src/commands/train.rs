@@ -21,7 +21,9 @@ use super::bars;
 use crate::arguments::{TrainArguments, TrainCommand};
 use crate::exit::ExitStatus;
 use crate::interrupt;
-use crate::output::{OutputFormat, print_error, print_progress, print_result, quoted_path};
+use crate::output::{
+    OutputFormat, counted, json_path, print_error, print_progress, print_result, quoted_path,
+};
 
 /// Largest size of a curves file, bytes.
 const MAX_BYTES: u64 = 1 << 28;
@@ -135,13 +137,15 @@ fn train<T: Trainer>(
     bar.finish_and_clear();
     if !is_finished? {
         let (done, steps) = run.progress();
-        print_error(&format!("stopped after {done} of {steps} steps; {how_to_resume}"));
+        let steps = counted(steps as usize, "step");
+        print_error(&format!("stopped after {done} of {steps}; {how_to_resume}"));
         return Ok(ExitStatus::Interrupted);
     }
     let weights = arguments.out.join(T::WEIGHTS);
     let evaluate = names.evaluate.replace("FILE", &quoted_path(&weights));
     let text = format!("Weights:  {}\nEvaluate: {evaluate}\n", quoted_path(&weights));
-    print_result(format, &json!({ "weights": weights, "evaluate": evaluate }), &text)?;
+    let json = json!({ "weights": json_path(&weights), "evaluate": evaluate });
+    print_result(format, &json, &text)?;
     Ok(ExitStatus::Success)
 }
 

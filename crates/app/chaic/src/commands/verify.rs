@@ -10,13 +10,13 @@ use chaic_eval::run::RunFolder;
 use chaic_eval::suite::SuiteFolder;
 use chaic_eval::trace_file;
 use chaic_eval::verify::{Finding, Mismatch, ReportState, VerificationReport, verify, verify_run};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::recorded::RecordedHelpers;
 use super::{bars, jobs};
 use crate::arguments::VerifyArguments;
 use crate::exit::ExitStatus;
-use crate::output::{OutputFormat, counted, print_result, print_warning};
+use crate::output::{OutputFormat, counted, json_path, print_result, print_warning};
 
 /// Replays the traces of a run, or a single trace, and compares all that is recorded.
 pub fn run(arguments: &VerifyArguments, format: OutputFormat) -> Result<ExitStatus> {
@@ -80,10 +80,9 @@ fn verify_partners(arguments: &VerifyArguments, format: OutputFormat) -> Result<
     } else {
         "the folder has findings beside those of its runs\n"
     };
-    let finding = |f: &Finding| json!({ "path": f.path, "problem": f.problem });
     let json = json!({
         "passed": is_good,
-        "findings": findings.iter().map(finding).collect::<Vec<_>>(),
+        "findings": findings.iter().map(finding_json).collect::<Vec<_>>(),
         "partners": of_partners,
     });
     print_result(format, &json, &all_text)?;
@@ -112,20 +111,23 @@ fn verify_file(path: &Path, format: OutputFormat) -> Result<ExitStatus> {
     Ok(ExitStatus::from_findings(problem.is_some()))
 }
 
-fn to_json(verdict: &VerificationReport) -> serde_json::Value {
+fn finding_json(finding: &Finding) -> Value {
+    json!({ "path": json_path(&finding.path), "problem": finding.problem })
+}
+
+fn to_json(verdict: &VerificationReport) -> Value {
     let mismatch = |m: &Mismatch| {
         json!({
-            "path": m.path, "frame": m.frame, "agent": m.agent.map(AgentId::role_name),
-            "problem": m.problem,
+            "path": json_path(&m.path), "frame": m.frame,
+            "agent": m.agent.map(AgentId::role_name), "problem": m.problem,
         })
     };
-    let finding = |f: &Finding| json!({ "path": f.path, "problem": f.problem });
     let coverage = &verdict.coverage;
     json!({
         "passed": verdict.is_good(),
         "traces": { "agreeing": verdict.agreeing, "decisions": verdict.decisions },
         "mismatches": verdict.mismatches.iter().map(mismatch).collect::<Vec<_>>(),
-        "findings": verdict.findings.iter().map(finding).collect::<Vec<_>>(),
+        "findings": verdict.findings.iter().map(finding_json).collect::<Vec<_>>(),
         "episode_runs": {
             "planned": coverage.planned,
             "missing": coverage.missing.len(),

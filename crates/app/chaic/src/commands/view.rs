@@ -12,7 +12,7 @@ use serde_json::json;
 use super::llm::shown_language;
 use crate::arguments::ViewArguments;
 use crate::exit::ExitStatus;
-use crate::output::{OutputFormat, counted, print_result, print_warning, quoted_path};
+use crate::output::{OutputFormat, counted, json_path, print_result, print_warning, quoted_path};
 
 /// Default name of the page.
 const FILE_NAME: &str = "view.html";
@@ -38,7 +38,8 @@ pub fn run(arguments: &ViewArguments, format: OutputFormat) -> Result<ExitStatus
     let out = out.clone().unwrap_or_else(|| folder.path().join(FILE_NAME));
     write_atomically(&out, page.as_bytes())?;
     if let Some(n @ 1..) = found.len().checked_sub(replays.len()) {
-        print_warning(&format!("{n} more replays are left out; see --max and --helper"));
+        let (replays, are) = (counted(n, "more replay"), if n == 1 { "is" } else { "are" });
+        print_warning(&format!("{replays} {are} left out; see --max and --helper"));
     }
     let (n, bytes) = (replays.len(), page.len());
     let size = format!("{:.1} MB", bytes as f64 / 1e6);
@@ -47,6 +48,7 @@ pub fn run(arguments: &ViewArguments, format: OutputFormat) -> Result<ExitStatus
         counted(n, "replay"),
         quoted_path(&out) + " (" + &size + ")"
     );
-    print_result(format, &json!({ "out": out, "replays": n, "bytes": bytes }), &text)?;
+    let json = json!({ "out": json_path(&out), "replays": n, "bytes": bytes });
+    print_result(format, &json, &text)?;
     Ok(ExitStatus::Success)
 }

@@ -106,6 +106,8 @@ fn a_contest_from_end_to_end() {
         ["submit", "run", "mine.tar", PARTIAL, "--rhp", "--out", "results/mine", "--episodes"];
     let unscored = fail(at, &["submit", "score", "results/mine"]);
     assert!(unscored.contains("results/mine"), "{unscored}");
+    let problem = fail(at, &[&play[..], &["nodir"]].concat());
+    assert!(problem.contains("nodir") && !at.join("results").exists(), "{problem}");
     let played = succeed(at, &[&play[..], &["short"]].concat());
     assert!(played.contains("results/mine/run: 6 episode runs"), "{played}");
     let journal = fs::read(at.join("results/mine/run/results.jsonl")).expect("results");
@@ -120,6 +122,13 @@ fn a_contest_from_end_to_end() {
     assert!(!score.contains(&at.display().to_string()), "a score has no paths");
     let confirmed = succeed(at, &["submit", "verify", "results/mine"]);
     assert!(confirmed.contains("confirmed by 6 traces"), "{confirmed}");
+
+    // Folders of the wrong level.
+    let problem = fail(at, &["submit", "verify", "results"]);
+    assert!(problem.contains("name the folder that `chaic submit run` wrote"), "{problem}");
+    let problem = fail(at, &["leaderboard", "build", "results/mine", "--out", "none.html"]);
+    assert!(problem.contains("is one folder of chaic submit run"), "{problem}");
+    assert!(!at.join("none.html").exists());
 
     // A second submission plays other episodes, so it is in another table.
     write_built_in(at);

@@ -120,6 +120,36 @@ fn episodes_out_of_bounds_are_refused() {
     assert!(message.contains("version: is 7, this program reads version 1"), "{message}");
 }
 
+/// Nothing was played before the message, so one line is printed.
+#[test]
+fn paths_of_results_are_checked_before_the_work() {
+    let dir = tempfile::tempdir().expect("the disk has space");
+    let at = dir.path();
+    fs::create_dir(at.join("folder")).expect("the disk has space");
+    fs::write(at.join("file"), "").expect("the disk has space");
+    let few = ["--n-episodes", "1"];
+    let detection = ["eval", "detection", "--views", "1"];
+    for (command, option) in [
+        (&detection[..], "--json"),
+        (&detection, "--error-rates"),
+        (&detection, "--coco"),
+        (&[&["collect", "opponent"], &few[..]].concat(), "--out"),
+        (&[&["eval", "opponent", "--weights", "w"], &few[..]].concat(), "--json"),
+        (&[&["eval", "behavior", "--perception", "gt"], &few[..]].concat(), "--json"),
+        (&[&["eval", "tracks", "--perception", "gt_masks"], &few[..]].concat(), "--json"),
+    ] {
+        let cases = match option {
+            "--coco" => [("file", "file is no folder"), ("file/inner", "file is no folder")],
+            _ => [("nodir/x", "there is no folder nodir"), ("folder", "it is a folder")],
+        };
+        for (path, problem) in cases {
+            let message = run_err(at, &[command, &[option, path]].concat());
+            assert!(message.contains(problem), "{command:?} {option}: {message}");
+            assert_eq!(message.lines().count(), 1, "{command:?} {option}: {message}");
+        }
+    }
+}
+
 #[cfg(unix)]
 #[test]
 fn special_files_are_refused_without_waiting() {

@@ -18,6 +18,7 @@ fn an_opponent_model_is_an_input_of_a_policy() {
     let weights = "o/opponent.safetensors";
     let reply = run_ok(at, &[&["eval", "opponent", "--weights", weights][..], &few].concat());
     assert!(reply.contains("goal accuracy") && reply.contains("no_wheelchair"), "{reply}");
+    assert!(reply.contains(" ± /  ("), "one episode has no standard error: {reply}");
     assert!(run_err(at, &["eval", "opponent", "--weights", "w"]).contains('w'));
     let policy = "iterations = 1\n[rollout]\nepisodes = 1\nvalidation_episodes = 1\nimage_size = 16\n\
                   tasks = [\"low_target\"]\nopponent = \"o/opponent.safetensors\"\n";
@@ -119,6 +120,7 @@ fn a_trained_policy_is_a_helper() {
         ("mine=policy:small.toml", "small.toml"),
         ("mine=policy:missing", "missing"),
         ("rhp=policy:u/policy.safetensors", "there is a helper `rhp` already"),
+        ("a b=policy:u/policy.safetensors", "`a b` is not a valid name"),
     ] {
         let reply =
             run_err(at, &["eval", "--task", "low_target", "--out", "x", "--helper", helper]);

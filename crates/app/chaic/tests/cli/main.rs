@@ -15,6 +15,7 @@ mod interrupted;
 mod language;
 mod learning;
 mod lists;
+mod messages;
 mod partners;
 mod perception;
 mod pictures;
@@ -250,7 +251,7 @@ fn fidelity_from_end_to_end() {
     fs::write(&journal, &lines[..first]).expect("the disk has space");
     fs::remove_file(at.join("fid/compat/report.md")).expect("it exists");
     let message = run_err(at, &["fidelity", "--only-document", "--out", "fid"]);
-    assert!(message.contains("1 episode runs are missing"), "{message}");
+    assert!(message.contains("1 episode run is missing"), "{message}");
     assert!(doc("fid/fidelity.md").contains("- `compat`: 1 of 2 are missing"));
     let report = output_of(at, &["report", "fid/compat", "--format", "csv"]);
     assert!(text(&report.stderr).contains("Unfinished: 1 of 2"), "{}", text(&report.stderr));
@@ -271,6 +272,26 @@ fn fidelity_from_end_to_end() {
     fs::write(&other, ours).expect("the disk has space");
     run_ok(at, &["fidelity", "--resume", "--out", "fid", "--doc", "docs/f.md"]);
     assert_eq!(doc("docs/f.md"), whole);
+}
+
+#[test]
+fn fidelity_names_the_episodes_until_a_run_has_copies() {
+    let dir = short_episodes();
+    let at = dir.path();
+    let options = ["--episodes", "short", "--out", "fid", "--doc", "f.md"];
+    let begin = ["fidelity", "--task", "no_constraint", "--seeds", "1", "--helper", "none,rhp"];
+    let begin = [&begin[..], &["--size", "48", "--no-switches"], &options].concat();
+    run_ok(at, &begin);
+    // The run of a part cannot be opened, because its folder holds something else.
+    for (part, option) in [("paper", ""), ("compat", " --episodes short")] {
+        let folder = at.join("fid").join(part);
+        fs::remove_dir_all(&folder).expect("it exists");
+        fs::create_dir(&folder).expect("the disk has space");
+        fs::write(folder.join("letter.txt"), "dear").expect("the disk has space");
+        let message = run_err(at, &[&["fidelity", "--resume"], &options[..]].concat());
+        let hint = format!("continue with: chaic fidelity --resume --out fid{option} --doc f.md");
+        assert!(message.contains(&hint), "{hint}: {message}");
+    }
 }
 
 #[test]

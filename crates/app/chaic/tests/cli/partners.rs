@@ -147,7 +147,7 @@ fn wrong_partners_are_refused_with_one_line() {
         refused
     };
     for (from, to, words) in [
-        ("\"drawn:7\"", "\"ogre\"", "unknown partner `ogre`"),
+        ("\"drawn:7\"", "\"ogre\"", "wrong.json: `drawn`: unknown partner `ogre`"),
         ("\"drawn:7\"", "\"habits:pause=999\"", "from 0 to 600"),
         ("+speed150", "+speed300", "50 to 200"),
         ("\"hasty\"", "\"drawn\"", "two partners have the name `drawn`"),
@@ -214,9 +214,12 @@ fn a_recorded_partner_repeats_a_trace_and_is_named_by_its_digest() {
     assert!(!at.join("d").exists());
     let body = ["--split", "gen:12..13", "--out", "d", "--person", "child", "--partner", recorded];
     assert!(run_err(at, &play(&body)).contains("no recording of"));
-    for (partner, words) in
-        [("recorded:missing", "missing"), ("policy:b/run.json", "not a weights file")]
-    {
+    for (partner, words) in [
+        ("recorded:missing", "missing"),
+        ("policy:b/run.json", "not a weights file"),
+        ("recorded:", "`recorded:` has no path after the colon"),
+        ("policy:", "`policy:` has no path after the colon"),
+    ] {
         let refused = run_err(at, &play(&[&split[..], &["d", "--partner", partner]].concat()));
         assert!(refused.contains(words) && refused.lines().count() <= 2, "{refused}");
     }

@@ -52,10 +52,16 @@ fn helpers_detect_objects_with_trained_weights() {
     let weights = "training/detector.safetensors";
     let evaluate = ["eval", "perception", "--weights", weights, "--views", "2"];
     let files = ["--json", "report.json", "--coco", "coco", "--faults", "faults.json"];
-    run_ok(dir, &[&evaluate[..], &files].concat());
+    let printed = run_ok(dir, &[&evaluate[..], &files].concat());
+    assert!(printed.contains("\n2 all-classes views, canonical appearance, "), "{printed}");
+    let coco = fs::read_to_string(dir.join("coco/annotations.json")).unwrap();
+    assert!(coco.contains("all-classes views of chaic, canonical look"), "{coco}");
     let report = fs::read(dir.join("report.json")).unwrap();
     let report: serde_json::Value = serde_json::from_slice(&report).unwrap();
     assert!(report["map50"].is_f64() && report["map"].is_f64(), "{report}");
+    // No class has that many instances in two views.
+    assert!(report["map50_of_frequent"][0].is_null(), "{report}");
+    assert!(printed.contains("0 classes with at least 50 instances: map50 /\n"), "{printed}");
     for file in ["annotations.json", "detections.json"] {
         let coco = fs::read(dir.join("coco").join(file)).unwrap();
         serde_json::from_slice::<serde_json::Value>(&coco).unwrap();
@@ -122,10 +128,19 @@ fn helpers_recognize_behavior_with_trained_weights() {
     let weights = "training/behavior.safetensors";
     let evaluate = ["eval", "behavior", "--weights", weights, "--perception", "gt"];
     let few = ["--episodes", "1", "--clips", "2", "--json", "report.json"];
-    run_ok(dir, &[&evaluate[..], &few].concat());
+    let printed = run_ok(dir, &[&evaluate[..], &few].concat());
+    assert!(printed.contains(" with gt perception, canonical appearance; columns"), "{printed}");
     let report = fs::read(dir.join("report.json")).unwrap();
     let report: serde_json::Value = serde_json::from_slice(&report).unwrap();
-    assert!(report["top1"].is_f64() && report["confusion"].is_object(), "{report}");
+    assert!(report["clips"].is_u64() && report["confusion"].is_object(), "{report}");
+    let kept = [&evaluate[..], &few, &["--clip-folder", "clips"]].concat();
+    let first = run_ok(dir, &kept);
+    fs::write(dir.join("clips/clips-000000.safetensors"), "no clips").unwrap();
+    assert!(run_err(dir, &kept).contains("holds no clips"));
+    fs::remove_file(dir.join("clips/clips-000000.safetensors")).unwrap();
+    assert_eq!(run_ok(dir, &kept), first);
+    let other = output_of(dir, &[&kept[..], &["--appearance", "varied"]].concat());
+    assert!(text(&other.stderr).contains("of another configuration"));
     let behavior = format!("learned:{weights}");
     run_ok(dir, &[&EVAL[..], &["--behavior", &behavior, "--out", "run"]].concat());
     let scores = fs::read_to_string(dir.join("run/scores.json")).unwrap();
@@ -150,6 +165,11 @@ fn tracks_are_evaluated() {
     let report = fs::read(dir.join("tracks.json")).unwrap();
     let report: serde_json::Value = serde_json::from_slice(&report).unwrap();
     assert!(report["memory_recall"]["value"].as_f64().unwrap() > 0.8, "{report}");
+    // One episode has no interval.
+    assert!(report["memory_recall"]["interval"].is_null(), "{report}");
+    assert!(printed.contains(" +- / of ") && !printed.contains("+- 0.000"), "{printed}");
+    let error = run_err(dir, &["eval", "tracks", "--n-episodes", "5001"]);
+    assert!(error.contains("1..=5000"), "{error}");
     let error = run_err(dir, &[&tracks[..], &["--perception", "perfect"]].concat());
     assert!(error.contains("no perception `perfect`"), "{error}");
 }

@@ -123,6 +123,38 @@ fn failed_episode_runs_count_as_zero_in_reports_from_traces() {
 }
 
 #[test]
+fn reports_from_traces_leave_out_traces_of_other_episode_runs() {
+    let dir = played();
+    let at = dir.path();
+    let trace = at.join("run").join(TRACE);
+    let report = || {
+        let out = output_of(at, &["report", "run", "--from-traces", "--format", "json"]);
+        assert!(out.status.success(), "{out:?}");
+        (text(&out.stdout), text(&out.stderr))
+    };
+    let (whole, warnings) = report();
+    assert!(!warnings.contains("left out"), "{warnings}");
+    // A copy with the name of a seed that the run does not have.
+    let unplanned = trace.with_file_name("gen-0-s7.jsonl");
+    fs::copy(&trace, &unplanned).expect("the disk has space");
+    let (found, warnings) = report();
+    assert_eq!(found, whole);
+    let expected =
+        "gen-0-s7.jsonl: this run doesn't play that episode run, so its trace is left out";
+    assert!(warnings.contains(expected), "{warnings}");
+    fs::remove_file(&unplanned).expect("it exists");
+    // A copy in the place of another trace counts neither twice nor as the other one.
+    let other = at.join("run").join(TRACE.replace("no_constraint", "moving_house"));
+    fs::copy(&trace, other).expect("the disk has space");
+    let (found, warnings) = report();
+    let expected = "it is the trace of no_constraint/gen/0 with none and seed 0, so it is left out";
+    assert!(warnings.contains(expected) && warnings.contains("1 of 2 finished"), "{warnings}");
+    let found: serde_json::Value = serde_json::from_str(&found).expect("it is JSON");
+    let counts = serde_json::json!({"planned": 2, "scored": 1, "broken": 0, "missing": 1});
+    assert_eq!(found["episode_runs"], counts);
+}
+
+#[test]
 fn differences_are_of_the_same_episodes_and_name_missing_ones() {
     let dir = played();
     let at = dir.path();
@@ -189,7 +221,7 @@ fn altered_and_cut_traces_are_refused_or_reported() {
         assert!(message.contains("gen-0-s0.jsonl: "), "{message}");
     }
     let of_task = [&export[..], &["none", "--task", "no_constraint"]].concat();
-    assert!(run_err(at, &of_task).contains("has no such episodes"));
+    assert!(run_err(at, &of_task).contains("no such trace that is whole; 1 trace cut off"));
     fs::write(&trace, whole).expect("the disk has space");
     run_ok(at, &[&export[..], &["whole"]].concat());
     run_ok(at, &replay);

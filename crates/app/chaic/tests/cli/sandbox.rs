@@ -38,7 +38,7 @@ fn a_helper_sees_neither_the_run_nor_the_start_folder() {
     if is_whole(&run) {
         let results = fs::read_to_string(run.join("results.jsonl")).expect("it exists");
         assert!(results.contains("No such file"), "{results}");
-        for secret in ["digest", "options", "no_constraint.json", "--episodes"] {
+        for secret in ["digest", "options", "no_constraint-0.json", "--episodes"] {
             assert!(!results.contains(secret), "{secret}: {results}");
         }
     }
@@ -137,7 +137,7 @@ fn a_helper_reads_files_of_its_command_line_and_those_the_user_adds() {
     let run = dir.path().join("hidden");
     let message = fs::read_to_string(run.join("results.jsonl")).expect("it exists");
     assert!(message.contains("weights-are-here"), "{message}");
-    assert!(!is_whole(&run) || !message.contains("no_constraint.json"), "{message}");
+    assert!(!is_whole(&run) || !message.contains("no_constraint-0.json"), "{message}");
     for (path, problem) in [("nowhere", "--exec-read nowhere"), ("/", "--exec-trust")] {
         let out = output_of(dir.path(), &play(line, "none", &["--exec-read", path]));
         assert_eq!(out.status.code(), Some(2), "{path}: {}", text(&out.stderr));
@@ -211,4 +211,27 @@ fn an_incomplete_sandbox_is_reported_and_the_hidden_track_refuses_it() {
     assert!(message.contains("the hidden track needs the whole sandbox"), "{message}");
     let trusted = without(&play(line, "trusted", &["--track", "hidden", "--exec-trust"]));
     assert_eq!(trusted.expect("as before").status.code(), Some(1));
+}
+
+/// Landlock alone hides the folders of the run and of the episodes inside a readable folder.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_run_is_hidden_inside_a_readable_folder_without_namespaces() {
+    let dir = short_episodes();
+    fs::write(dir.path().join("weights"), "weights-are-here").expect("the disk has space");
+    let spy = "exec:{ head -c 200 run/run.json; ls short; cat weights; } >&2; exit 1";
+    let readable = play(spy, "run", &["--exec-read", "."]);
+    if output_without_namespaces(dir.path(), &readable).is_none() {
+        return;
+    }
+    let run = dir.path().join("run");
+    // Without Landlock nothing is hidden.
+    if granted(&run)["isolation"]["exec"] != "sandbox without namespaces" {
+        return;
+    }
+    let results = fs::read_to_string(run.join("results.jsonl")).expect("it exists");
+    assert!(results.contains("weights-are-here"), "{results}");
+    for secret in ["renderer", "no_constraint-0.json"] {
+        assert!(!results.contains(secret), "{secret}: {results}");
+    }
 }

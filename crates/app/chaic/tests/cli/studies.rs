@@ -60,6 +60,13 @@ fn a_study_is_checked_and_built() {
     assert!(refused.contains("study.toml: `participants` must be from 1 to 10000"), "{refused}");
     assert_eq!(refused.lines().count(), 1, "{refused}");
     assert!(!at.join("none.html").exists());
+    for (from, to) in [("test/01", "test/99"), ("timeout_minutes", "timeout"), ("rhp", "nobody")] {
+        fs::write(at.join("study.toml"), STUDY.replace(from, to)).expect("the disk has space");
+        let out = output_of(at, &["study", "check", "study.toml"]);
+        let refused = text(&out.stderr);
+        assert!(refused.contains("study.toml: ") && refused.contains(to), "{refused}");
+        assert_eq!(out.status.code(), Some(2), "{refused}");
+    }
 }
 
 #[test]

@@ -105,9 +105,13 @@ fn a_helper_inherits_only_the_named_environment_variables() {
 fn a_command_is_checked_from_the_command_line() {
     let dir = short_episodes();
     let program = cargo_bin!("chaic").display().to_string();
-    let kept =
-        run_ok(dir.path(), &["helper", "check", &format!("'{program}' helper serve random")]);
+    let served = format!("'{program}' helper serve random");
+    let granted = ["helper", "check", &served, "--exec-grants", "ids,goal_place"];
+    let kept = run_ok(dir.path(), &granted);
     assert!(kept.contains("follows the protocol") && !kept.contains("FAILED"), "{kept}");
+    let refused = run_err(dir.path(), &granted[..3]);
+    let problem = "failed: the briefing lacks the grants ids,goal_place; give --exec-grants";
+    assert!(refused.contains(problem), "{refused}");
     let out = output_of(dir.path(), &["helper", "check", "cat"]);
     assert_eq!(out.status.code(), Some(1));
     assert!(text(&out.stdout).contains("1 check failed"), "{}", text(&out.stdout));
@@ -117,8 +121,14 @@ fn a_command_is_checked_from_the_command_line() {
         &["eval", "--helper", "exec:true", "--helper", "exec:false"],
         &["eval", "--helper", "exec:true", "--exec-grants", "gold"],
         &["eval", "--helper", "exec:true", "--exec-decision-s", "soon"],
+        &["eval", "--helper", "none", "--exec-read", "nofile", "--out", "none"],
+        &["eval", "--helper", "policy:", "--out", "none"],
+        &["eval", "--helper", "none", "--perception", "learned:", "--out", "none"],
         &["helper", "serve", "nobody"],
+        &["helper", "serve", "none"],
+        &["helper", "check", ""],
     ] {
         assert_eq!(output_of(dir.path(), wrong).status.code(), Some(2), "{wrong:?}");
     }
+    assert!(!dir.path().join("none").exists());
 }

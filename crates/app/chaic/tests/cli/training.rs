@@ -29,7 +29,8 @@ fn inputs_are_checked_before_the_folder_is_made() {
             let begun = run_err(at, &["train", training, "--out", "o", "--weights", weights]);
             assert!(begun.contains(weights) && begun.lines().count() == 1, "{begun}");
             assert!(!at.join("o").exists(), "{training}");
-            run_err(at, &["train", training, "--out", "o", "--resume"]);
+            let resumed = run_err(at, &["train", training, "--out", "o", "--resume"]);
+            assert!(resumed.contains("o holds no training"), "{resumed}");
             assert!(!at.join("o").exists(), "{training}");
         }
     }

@@ -181,11 +181,11 @@ pub struct LimitPenalty {
 }
 
 impl LimitPenalty {
-    /// Pick-up beyond the height range, in meters (paper section 3.1).
+    /// Pick-up beyond the height range, in meters (the original's code, facts S1.3).
     pub const PICK: LimitPenalty = LimitPenalty { alpha: 1.0, beta: 2.0 };
-    /// Put-on beyond the height range, in meters (paper section 3.1).
+    /// Put-on beyond the height range, in meters (the original's code, facts S1.3).
     pub const PUT: LimitPenalty = LimitPenalty { alpha: 1.0, beta: 1.0 };
-    /// Lift beyond the strength, in kilograms (paper section 3.1).
+    /// Lift beyond the strength, in kilograms (the original's code, facts S1.3).
     pub const LIFT: LimitPenalty = LimitPenalty { alpha: 50.0, beta: 1.0 };
 
     /// Returns the success probability of an action that exceeds its limit by `delta`.

@@ -1,4 +1,6 @@
-//! Only regular files are opened.
+//! Only regular files are opened, and only some functions create missing ones.
+
+use std::io::Write as _;
 
 use super::*;
 
@@ -21,6 +23,20 @@ fn only_regular_files_are_read_up_to_the_limit() {
         assert!(error.contains("can't read /dev/null: it is no regular file"), "{error}");
         assert!(read_user_file(Path::new("/dev/zero"), 4).is_err());
     }
+}
+
+#[test]
+fn a_removed_file_is_not_created_again() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("a.txt");
+    let missing = open_existing_for_append(&path).unwrap_err();
+    assert_eq!(missing.error.kind(), ErrorKind::NotFound);
+    assert!(missing.to_string().starts_with("can't open "), "{missing}");
+    assert!(!path.exists());
+    open_for_append(&path).unwrap().write_all(b"first").unwrap();
+    open_existing_for_append(&path).unwrap().write_all(b", second").unwrap();
+    assert_eq!(fs::read(&path).unwrap(), b"first, second");
+    assert!(open_existing_for_append(dir.path()).is_err());
 }
 
 #[cfg(unix)]
@@ -90,6 +106,7 @@ mod links {
         for name in ["f/y", "f/z", "f/p", "g"] {
             let path = root.join(name);
             assert!(open_for_append(&path).is_err(), "{name}");
+            assert!(open_existing_for_append(&path).is_err(), "{name}");
             assert!(open_or_create(&path).is_err(), "{name}");
         }
         assert!(!dir.path().join("new").exists());

@@ -15,9 +15,9 @@ use rustix::thread::{
 };
 
 use super::landlock::{Access, restrict};
-use super::{SetupError, SetupResult, filter, root, usage};
+use super::{SetupError, SetupResult, filter, root, shared, usage};
 use crate::isolation::{Isolation, IsolationPart, MissingPart};
-use crate::policy::{DEVICES, Policy, SYSTEM_FILES, SYSTEM_FOLDERS};
+use crate::policy::{DEVICES, Policy};
 use crate::request::{Mode, Request};
 
 /// Shell script of the first process in the sandbox. It runs the command line, adopts and reaps
@@ -46,7 +46,7 @@ pub(super) fn run(request: &Request) -> SetupResult<u8> {
     drop_capabilities()?;
     let access = match writable {
         Some(writable) => private_access(writable),
-        None => shared_access(policy, home.clone()),
+        None => shared::access(policy, home.clone()),
     };
     let mut add_missing = |part, reason: String| missing.push(MissingPart { part, reason });
     match restrict(&access) {
@@ -121,11 +121,4 @@ fn drop_capabilities() -> SetupResult<()> {
 fn private_access(writable: Vec<PathBuf>) -> Access {
     let devices = DEVICES.iter().map(PathBuf::from).collect();
     Access { read: vec!["/".into()], write: writable, devices }
-}
-
-/// Returns the access within the file system that the command shares with the caller.
-fn shared_access(policy: &Policy, scratch: PathBuf) -> Access {
-    let system = SYSTEM_FOLDERS.iter().chain(SYSTEM_FILES).map(PathBuf::from);
-    let devices = DEVICES.iter().map(PathBuf::from).collect();
-    Access { read: system.chain(policy.readable.clone()).collect(), write: vec![scratch], devices }
 }

@@ -11,8 +11,8 @@ use chaic_eval::report::RecordedGrants;
 
 use super::*;
 use crate::partners::PartnersDigest;
-use crate::played::pooled;
-use crate::score::{EpisodeOutcome, PartnerScore, PartnersScore, SubmissionRecord};
+use crate::played::{compared, pooled};
+use crate::score::{EpisodeOutcome, PartnerScore, PartnersScore, SubmissionRecord, pooled_tasks};
 
 const EVIL: &str = "</td><script>alert(1)</script>\"'&";
 
@@ -94,10 +94,20 @@ fn with_partners(
     tremor: [u32; 6],
 ) -> ConfirmedEntry {
     let name = entry.score.submission.name.clone();
+    let results = [("+tires", tires), ("+tremor", tremor)]
+        .map(|(person, rates)| partner_results(person, &name, rates));
+    with_partner_results(entry, digest, results)
+}
+
+/// Adds these results with the persons `+tires` and `+tremor` to an evaluation.
+fn with_partner_results(
+    entry: ConfirmedEntry,
+    digest: &str,
+    [tires, tremor]: [Vec<RunResult>; 2],
+) -> ConfirmedEntry {
+    let name = entry.score.submission.name.clone();
     let persons: [(PersonChange, Vec<RunResult>); 2] = [("+tires", tires), ("+tremor", tremor)]
-        .map(|(person, rates)| {
-            (person.parse().expect("a change"), partner_results(person, &name, rates))
-        });
+        .map(|(person, results)| (person.parse().expect("a change"), results));
     let ordinary = PartnerResults { partner: RULES, person: None, results: &entry.results };
     let others = persons.iter().map(|(person, results)| PartnerResults {
         partner: if person.to_string() == "+tires" { "tires" } else { "trembles" },
@@ -115,9 +125,10 @@ fn with_partners(
         tr: BTreeMap::new(),
         episode_runs: partner.results.iter().map(record).collect(),
     });
-    let results = pooled(persons.iter().map(|(person, results)| (Some(*person), &results[..])));
+    let runs = || persons.iter().map(|(person, results)| (Some(*person), &results[..]));
+    let (results, compared) = (pooled(runs()), compared(runs()));
     let partners = PartnersScore {
-        tasks: tasks(&results),
+        tasks: pooled_tasks(&results, compared.as_deref(), &entry.environments),
         robustness: robustness(&played, &[name], &entry.environments),
         list: list.collect(),
     };
@@ -125,7 +136,7 @@ fn with_partners(
     let conditions =
         EvaluationConditions { partners: Some(digest), ..entry.score.conditions.clone() };
     let score = SubmissionScore { conditions, partners: Some(partners), ..entry.score.clone() };
-    ConfirmedEntry { score, results, ..entry }
+    ConfirmedEntry { score, results, compared, ..entry }
 }
 
 /// Returns an evaluation in which the helper delivers `rates` tenths per episode, and RHP 4 and 5.
@@ -162,7 +173,7 @@ fn entry(name: &str, conditions: &EvaluationConditions, rates: [u32; 6]) -> Conf
         episode_runs: results.iter().map(record).collect(),
         partners: None,
     };
-    ConfirmedEntry { folder: format!("of-{name}"), score, results, environments }
+    ConfirmedEntry { folder: format!("of-{name}"), score, results, compared: None, environments }
 }
 
 fn leaderboard(entries: Vec<ConfirmedEntry>) -> Leaderboard {
@@ -247,6 +258,39 @@ fn a_table_with_partners_ranks_by_the_list_and_shows_robustness() {
     let plain = leaderboard(vec![entry("plain", [7; 6])]);
     for text in [plain.to_html("t"), plain.to_json()] {
         assert!(!text.contains("robustness") && !text.contains("Share kept"), "{text}");
+    }
+}
+
+#[test]
+fn failed_runs_of_none_with_one_partner_do_not_bias_comparisons_with_none() {
+    let evaluation = |n_failed: usize| {
+        let [tires, mut tremor] = [("+tires", [2; 6]), ("+tremor", [0; 6])]
+            .map(|(person, rates)| partner_results(person, "mine", rates));
+        let of_none = tremor.iter_mut().filter(|result| result.key.helper == NONE);
+        for result in of_none.take(n_failed) {
+            result.status = RunStatus::Error { message: "the partner ended".to_owned() };
+        }
+        let entry = entry("mine", &rules("a", "unrestricted"), [5; 6]);
+        with_partner_results(entry, "x", [tires, tremor])
+    };
+    let row = |entry: ConfirmedEntry| {
+        let mut board = leaderboard(vec![entry]);
+        let rows = &mut board.tables[0].rows;
+        rows.remove(rows.iter().position(|row| row.name == "mine").expect("it played"))
+    };
+    let is_close = |a: f64, b: f64| (a - b).abs() < 1e-12;
+    // The helper has 0.2 instead of 0.1 with one partner, and 0 instead of 0.1 with the other one.
+    for (n_failed, ei, difference) in [(0, 0.0, 0.0), (3, 0.25, 0.05), (6, 0.5, 0.1)] {
+        // All runs of the helper count in its rate and in differences to another helper, 0.4.
+        let with_rhp = row(evaluation(n_failed));
+        assert!(is_close(with_rhp.tr, 0.1), "{with_rhp:?}");
+        assert!(is_close(with_rhp.difference.expect("paired with RHP").mean, -0.3));
+        let mut alone = evaluation(n_failed);
+        alone.score.grants.remove("rhp");
+        let alone = row(alone);
+        assert!(is_close(alone.tr, 0.1) && is_close(alone.ei.expect("compared"), ei), "{alone:?}");
+        let found = alone.difference.expect("paired with none").mean;
+        assert!(is_close(found, difference), "{found} instead of {difference}");
     }
 }
 

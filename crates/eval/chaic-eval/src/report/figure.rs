@@ -33,6 +33,13 @@ pub(super) fn figure_text(scores: &Scores, labels: Labels<'_>) -> Result<String>
     svg_text(&bars(scores, labels)).map_err(convert_error)
 }
 
+/// Returns the interval of [`shown_interval`], extended to contain the mean as figures require.
+pub fn drawn_interval(score: &Score) -> Option<[f64; 2]> {
+    // The interval is of sums over environments. Equal rates give it no width, and its rounding
+    // may then differ from that of the mean.
+    shown_interval(score).map(|[low, high]| [low.min(score.tr), high.max(score.tr)])
+}
+
 fn convert_error(error: FigureError) -> EvalError {
     match error {
         FigureError::UnsupportedExtension { .. } => EvalError::Options(error.to_string()),
@@ -44,13 +51,7 @@ fn convert_error(error: FigureError) -> EvalError {
 fn bars(scores: &Scores, labels: Labels<'_>) -> Bars {
     let tasks = scores.tasks();
     let bars = |helper: &String| {
-        // The interval is of sums over environments. Equal rates give it no width, and its rounding
-        // may then differ from that of the mean.
-        let with_mean = |[low, high]: [f64; 2], mean: f64| [low.min(mean), high.max(mean)];
-        let bar = |s: &Score| {
-            let interval = shown_interval(s).map(|ends| with_mean(ends, s.tr));
-            Bar { mean: s.tr, interval, dot: None }
-        };
+        let bar = |s: &Score| Bar { mean: s.tr, interval: drawn_interval(s), dot: None };
         let is_incomplete = tasks.iter().any(|t| {
             scores.is_unplayed(*t, helper) || scores.get(*t, helper).is_some_and(|s| s.incomplete)
         });

@@ -98,6 +98,23 @@ fn the_heading_has_the_version_that_started_the_run() {
 }
 
 #[test]
+fn one_episode_and_one_episode_run_are_singular() {
+    let (results, mut options) = (results(), options());
+    let mut text = |n_episodes, n_results: usize| {
+        options.n_episodes = n_episodes;
+        let (results, formulas) = (&results[..n_results], FormulaSet::Paper);
+        let (version, options) = (CHAIC_VERSION, &options);
+        Report { version, options, results, planned: &[], granted: None, formulas }
+            .text(Format::Markdown)
+    };
+    let all = text(None, 48);
+    assert!(all.contains(", all episodes of each task") && all.contains("48 episode runs.\n"));
+    let one = text(Some(1), 1);
+    assert!(one.contains(", first episode of each task") && one.contains("\n1 episode run.\n"));
+    assert!(text(Some(2), 2).contains(", first 2 episodes of each task"));
+}
+
+#[test]
 fn an_unfinished_run_is_reported() {
     let whole = results();
     let md = text(&whole, Format::Markdown);

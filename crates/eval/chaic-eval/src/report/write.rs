@@ -220,7 +220,11 @@ impl Report<'_> {
             self.options;
         let track =
             if *track == Track::default() { String::new() } else { format!(" Track: `{track}`.") };
-        let episodes = self.options.n_episodes.map_or("all".to_owned(), |n| format!("first {n}"));
+        let episodes = match self.options.n_episodes {
+            None => "all episodes".to_owned(),
+            Some(1) => "first episode".to_owned(),
+            Some(n) => format!("first {n} episodes"),
+        };
         let size = self.options.image_size;
         let size = size.map_or("as each agent requests".to_owned(), |px| format!("{px} pixels"));
         let played_by = match rule_overrides[..] {
@@ -236,7 +240,7 @@ impl Report<'_> {
         let person = person.map_or(String::new(), |k| format!(" The partner is `{k}`."));
         format!(
             "# chaic run\n\nchaic {version}, rules `{played_by}`, formulas `{}`. Split `{split}`, \
-             {episodes} episodes of each task, seeds per episode: {seeds}. Images: {size}.{driven}{person}{track}\n\n",
+             {episodes} of each task, seeds per episode: {seeds}. Images: {size}.{driven}{person}{track}\n\n",
             self.formulas,
         )
     }
@@ -291,7 +295,8 @@ impl Report<'_> {
                 self.options.track
             );
         }
-        let _ = writeln!(text, "{} episode runs.", self.results.len());
+        let n = self.results.len();
+        let _ = writeln!(text, "{n} episode run{}.", if n == 1 { "" } else { "s" });
         text
     }
 

@@ -34,7 +34,7 @@ pub struct EpisodeJob {
 /// run has comparable results.
 ///
 /// # Errors
-/// If the options select no episodes, or the run's copies of episode files can't be read.
+/// If the options select no episode run, or the run's copies of episode files can't be read.
 pub fn planned(folder: &RunFolder, options: &RunOptions) -> Result<Vec<EpisodeJob>> {
     let files = if options.split == FILES { read_copies(folder)? } else { vec![] };
     plan(options, &files)
@@ -46,6 +46,10 @@ fn read_copies(folder: &RunFolder) -> Result<Vec<Episode>> {
 }
 
 /// Plans a run from its options and, for the split `files`, its episodes.
+///
+/// # Errors
+/// If a task has no episode or too many, or the plan is empty: callers take an empty plan for an
+/// unknown one.
 pub(super) fn plan(options: &RunOptions, files: &[Episode]) -> Result<Vec<EpisodeJob>> {
     /// Maximum number of episode runs; a longer list is a mistake and exhausts memory.
     const MAX_JOBS: usize = 1_000_000;
@@ -73,6 +77,10 @@ pub(super) fn plan(options: &RunOptions, files: &[Episode]) -> Result<Vec<Episod
                 }
             }
         }
+    }
+    if jobs.is_empty() {
+        let text = "the run plays no episode: its tasks, helpers or seeds are empty";
+        return Err(EvalError::Options(text.to_owned()));
     }
     Ok(jobs)
 }
@@ -280,9 +288,14 @@ fn read_with_partner(source: &Path, options: &RunOptions) -> Result<Vec<Episode>
 /// Reads the episodes of the run's tasks from a user's folder, to be copied.
 ///
 /// # Errors
-/// If an episode can't be read, or two episodes would be copied to the same file.
+/// If an episode can't be read, a task has none, or two would be copied to the same file.
 pub(super) fn read_source(source: &Path, options: &RunOptions) -> Result<Vec<Episode>> {
     let episodes = read_with_partner(source, options)?;
+    let is_missing = |task: &&TaskId| !episodes.iter().any(|e| e.task() == **task);
+    if let Some(task) = options.tasks.iter().find(is_missing) {
+        let text = format!("{} holds no episode file (*.json) of {task}", source.display());
+        return Err(EvalError::Options(text));
+    }
     let mut names = BTreeSet::new();
     for episode in &episodes {
         if !names.insert((episode.task(), slug(episode.task(), episode.id()))) {

@@ -7,19 +7,23 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use chaic_env::trace::MAX_TRACE_BYTES;
-use chaic_env::{CHAIC_VERSION, RunKey};
+use chaic_env::{CHAIC_VERSION, EnvError, RunKey};
 use chaic_files::{
     EntryKind, FileError, create_folders_below, entries, kind, read_below, write_atomically,
 };
+use serde_json::Value;
 
 use super::folder::{COMMANDS, EPISODES, RECORDS};
 use super::journal::{Journal, read_results, to_line};
-use super::options::FILES;
+use super::options::{FILES, RunOptions};
 use super::plan;
 use super::{EpisodeJob, FolderMode, Run, RunFolder};
 use crate::error::{EvalError, Result};
 use crate::metrics::{FormulaSet, RunResult};
 use crate::report::{Report, write_files};
+
+/// Maximum size of the commands of a run, bytes, as in `chaic-subprocess`.
+const MAX_COMMANDS_BYTES: u64 = 1 << 20;
 
 /// Every `count`-th episode of a plan, from one of them on, with all helpers; each seed counts as an
 /// episode. The folder of a shard does not record the shard; it holds an unfinished run that can be
@@ -73,49 +77,19 @@ impl FromStr for Shard {
 /// same merge can be repeated.
 ///
 /// # Errors
-/// If the parts are of different runs or other episode files, have different results of an episode
-/// run, or have helpers that query language models; if a finished episode run has no trace; if files
-/// can't be read or written.
+/// If the parts are of different runs, episode files or commands of helpers; if they have different
+/// results of an episode run, or helpers that query language models; if a finished episode run has
+/// no trace; if files can't be read or written.
 pub fn merge(out: &Path, parts: &[PathBuf]) -> Result<Run> {
     let Some(first) = parts.first() else {
         return Err(EvalError::Options("name the runs to merge".to_owned()));
     };
     let (source, options) = RunFolder::read(first)?;
-    let granted = source.granted()?;
-    for part in parts {
-        let (folder, part_options) = RunFolder::read(part)?;
-        if part_options != options
-            || folder.granted()? != granted
-            || folder.other_version()?.is_some()
-        {
-            return Err(EvalError::Options(format!(
-                "{} and {} are parts of different runs, or of another version of chaic; play all shards with \
-                 the same options",
-                first.display(),
-                part.display(),
-            )));
-        }
-        if options.split == FILES && !plan::same_copies(&source, &folder)? {
-            return Err(EvalError::Options(format!(
-                "{} and {} have other episode files; play all shards with the same --episodes",
-                first.display(),
-                part.display(),
-            )));
-        }
-        if kind(&folder.join(RECORDS))? != EntryKind::Missing {
-            return Err(EvalError::Options(format!(
-                "{} has helpers that query language models, whose records can't be merged; play such a \
-                 run in one folder",
-                part.display(),
-            )));
-        }
-    }
-    let granted = granted.ok_or_else(|| {
+    let folders = read_parts(parts, &source, &options)?;
+    let granted = source.granted()?.ok_or_else(|| {
         EvalError::Options(format!("{} was started by an older version of chaic", first.display()))
     })?;
     let planned = plan::planned(&source, &options)?;
-    let folders = parts.iter().map(|part| Ok(RunFolder::read(part)?.0));
-    let folders: Vec<RunFolder> = folders.collect::<Result<_>>()?;
     let from_parts = results(&folders, &planned)?;
     let is_traced = |result: &RunResult| options.traces && result.summary().is_some();
     for (result, part) in from_parts.iter().filter(|(result, _)| is_traced(result)) {
@@ -147,6 +121,69 @@ pub fn merge(out: &Path, parts: &[PathBuf]) -> Result<Run> {
     Ok(Run { folder, options, granted, journal, planned, results, untraced: Vec::new() })
 }
 
+/// Opens the parts of one run, of which `source` is the first.
+///
+/// # Errors
+/// If a part is of another run, or can't be merged.
+fn read_parts(
+    parts: &[PathBuf],
+    source: &RunFolder,
+    options: &RunOptions,
+) -> Result<Vec<RunFolder>> {
+    let (granted, source_commands) = (source.granted()?, commands(source)?);
+    let first = source.path().display();
+    let refused = |problem: String| Err(EvalError::Options(problem));
+    let mut folders = Vec::with_capacity(parts.len());
+    for path in parts {
+        let (folder, part_options) = RunFolder::read(path)?;
+        let part = path.display();
+        if part_options != *options
+            || folder.granted()? != granted
+            || folder.other_version()?.is_some()
+        {
+            return refused(format!(
+                "{first} and {part} are parts of different runs, or of another version of chaic; \
+                 play all shards with the same options"
+            ));
+        }
+        if options.split == FILES && !plan::same_copies(source, &folder)? {
+            return refused(format!(
+                "{first} and {part} have other episode files; play all shards with the same \
+                 --episodes"
+            ));
+        }
+        if commands(&folder)? != source_commands {
+            return refused(format!(
+                "{first} and {part} were played with other commands; play all shards with the same \
+                 --helper and --exec-env"
+            ));
+        }
+        if kind(&folder.join(RECORDS))? != EntryKind::Missing {
+            return refused(format!(
+                "{part} has helpers that query language models, whose records can't be merged; \
+                 play such a run in one folder"
+            ));
+        }
+        folders.push(folder);
+    }
+    Ok(folders)
+}
+
+/// Returns the recorded commands of a run's helper processes, sorted; empty without any. The file
+/// has the order of the last `--helper` options, which may change when a run is resumed.
+fn commands(folder: &RunFolder) -> Result<Vec<String>> {
+    let path = folder.join(COMMANDS);
+    if kind(&path)? == EntryKind::Missing {
+        return Ok(Vec::new());
+    }
+    let bytes = read_below(folder.path(), &path, MAX_COMMANDS_BYTES)?;
+    let recorded: Vec<Value> = serde_json::from_slice(&bytes)
+        .map_err(|e| EnvError::Unreadable { path, line: e.line(), problem: e.to_string() })?;
+    let mut commands: Vec<String> = recorded.iter().map(Value::to_string).collect();
+    commands.sort();
+    Ok(commands)
+}
+
 /// Opens the run of an earlier [`merge`] of the same parts.
 ///
 /// # Errors
@@ -156,10 +193,13 @@ pub(crate) fn reopen_merged(out: &Path, parts: &[PathBuf]) -> Result<Run> {
     let other_run = || EvalError::NotEmpty { path: out.to_owned() };
     let (folder, recorded) = RunFolder::lock(out, FolderMode::Resume)?;
     let (options, granted) = recorded.zip(folder.granted()?).ok_or_else(other_run)?;
+    let merged_commands = commands(&folder)?;
     let mut folders = Vec::with_capacity(parts.len());
     for part in parts {
         let (part, part_options) = RunFolder::read(part)?;
-        let is_same = part_options == options && part.granted()?.as_ref() == Some(&granted);
+        let is_same = part_options == options
+            && part.granted()?.as_ref() == Some(&granted)
+            && commands(&part)? == merged_commands;
         if !is_same || (options.split == FILES && !plan::same_copies(&part, &folder)?) {
             return Err(other_run());
         }
@@ -185,7 +225,7 @@ fn check_trace(part: &RunFolder, key: &RunKey) -> Result<()> {
 }
 
 /// Returns the results of all parts in the order of the plan, each with its part. A completed
-/// result replaces a failed one.
+/// result replaces a failed one. Of equal results, one with a trace is kept.
 fn results<'p>(
     parts: &'p [RunFolder],
     planned: &[EpisodeJob],
@@ -205,6 +245,8 @@ fn results<'p>(
                         other_part.path().display(),
                     )));
                 }
+                Some((other, other_part))
+                    if *other == result && other_part.has_trace(&result.key) => {}
                 _ => {
                     found.insert(result.key.clone(), (result, part));
                 }

@@ -2,6 +2,7 @@
 
 mod forging;
 mod merging;
+mod partner_lists;
 mod starting;
 mod verifying;
 
@@ -12,7 +13,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use chaic_agents::PlannerRules;
 use chaic_core::observation::{Grants, SensorConfig};
 use chaic_core::{Action, Agent, AgentError, Briefing, Observation, TaskId};
-use chaic_env::helper_registry::Helper;
+use chaic_env::helper_registry::{Helper, built_in_partner};
 use chaic_env::{Digest, EnvError};
 use chaic_episodes::Episode;
 
@@ -80,7 +81,8 @@ impl Agent for FailingAgent {
     }
 }
 
-/// Helpers of these tests. The stop flag is raised after `stop_after` helpers have been created.
+/// Helpers of these tests, and the partner `stranger`. The stop flag is raised after `stop_after`
+/// helpers have been created.
 struct TestHelpers {
     n_created: AtomicUsize,
     stop_after: usize,
@@ -110,6 +112,13 @@ impl HelperRegistry for TestHelpers {
             _ => return None,
         };
         Some(Helper { agent, grants: Grants::NONE })
+    }
+
+    fn partner(&self, name: &str, _: Option<&RunKey>, rules: PlannerRules) -> Option<Helper> {
+        if name != "stranger" {
+            return built_in_partner(name, rules);
+        }
+        Some(Helper { agent: Box::new(FailingAgent(Failure::None)), grants: Grants::NONE })
     }
 }
 

@@ -3,14 +3,15 @@
 use chaic_core::observation::Grants;
 use chaic_files::{entries, read_bounded};
 
+use super::episodes::episode_problems;
 use super::{PartnerRun, REPORT, Robustness, SuiteFolder};
 use crate::error::Result;
 use crate::run::{PARTNERS_FILE, RunFolder, RunGrants, RunOptions};
 use crate::verify::Finding;
 
 impl SuiteFolder {
-    /// Returns the problems of the folder: runs whose options or recorded grants differ in more than
-    /// the partner, other entries, and a report that differs from the results.
+    /// Returns the problems of the folder: runs whose options, recorded grants or episodes differ in
+    /// more than the partner, other entries, and a report that differs from the results.
     ///
     /// # Errors
     /// If a file can't be read.
@@ -40,6 +41,9 @@ impl SuiteFolder {
                                the other runs";
                 add(&run.partner.name, problem.to_owned());
             }
+        }
+        for (name, problem) in episode_problems(runs) {
+            add(name, problem);
         }
         for path in entries(&self.path)? {
             let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();

@@ -148,15 +148,20 @@ impl FolderCheck<'_> {
             add("it lacks the grants of helpers");
             return Ok(());
         };
-        let named = |names: &mut dyn Iterator<Item = &String>| -> BTreeSet<String> {
-            names.filter(|name| *name != NONE).cloned().collect()
-        };
-        let helpers = named(&mut self.options.helpers.iter());
-        if named(&mut granted.helpers.keys()) != helpers {
+        // `none` has no grants.
+        let helpers: BTreeSet<&String> =
+            self.options.helpers.iter().filter(|name| *name != NONE).collect();
+        if granted.helpers.keys().collect::<BTreeSet<_>>() != helpers {
             add("its grants are not those of the helpers that play");
         }
-        if !named(&mut granted.perception.keys()).is_subset(&helpers) {
-            add("it names the perception of helpers that do not play");
+        for (what, by_helper) in [
+            ("perception", &granted.perception),
+            ("isolation", &granted.isolation),
+            ("weights", &granted.weights),
+        ] {
+            if !by_helper.keys().all(|name| helpers.contains(name)) {
+                add(&format!("it names the {what} of helpers that do not play"));
+            }
         }
         Ok(())
     }

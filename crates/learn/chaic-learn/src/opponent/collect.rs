@@ -110,6 +110,11 @@ impl WindowCollectionConfig {
             return Err("`collect.tasks` is empty".to_owned());
         }
         let perception = self.perception_factory().map_err(|e| e.to_string())?;
+        let requested = Grants { behavior: self.granted, ..Grants::PLANNER };
+        if self.granted && !perception.grants(requested).behavior {
+            let options = "`--grant-behavior` needs `--behavior gt`";
+            return Err(format!("`collect.granted` needs `collect.behavior = \"gt\"` ({options})"));
+        }
         perception.check_image_size(self.image_size)
     }
 

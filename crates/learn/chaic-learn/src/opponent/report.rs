@@ -12,10 +12,11 @@ use super::{LIMITS, N_LIMITS, OpponentGoal};
 /// Mean with its uncertainty.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct MeanEstimate {
-    /// Mean over windows.
-    pub mean: f64,
-    /// Standard error, with the windows of an episode as one cluster.
-    pub standard_error: f64,
+    /// Mean over windows; `None` without windows.
+    pub mean: Option<f64>,
+    /// Standard error, with the windows of an episode as one cluster; `None` for fewer than two
+    /// episodes.
+    pub standard_error: Option<f64>,
     /// Number of windows.
     pub n: usize,
 }
@@ -29,13 +30,13 @@ pub struct OpponentReport {
     pub target_accuracy: MeanEstimate,
     /// Mean squared error of the five limits.
     pub limits_error: MeanEstimate,
-    /// Mean squared error of each limit.
+    /// Mean squared error of each limit; `None` without windows.
     #[serde(rename = "error_of_limit")]
-    pub error_by_limit: BTreeMap<&'static str, f64>,
+    pub error_by_limit: BTreeMap<&'static str, Option<f64>>,
     /// Confusion matrix (rows: truth), in the order of [`OpponentGoal::ALL`].
     pub confusion: [[usize; N_GOALS]; N_GOALS],
-    /// Expected calibration error of the goal probabilities over ten bins.
-    pub calibration_error: f64,
+    /// Expected calibration error of the goal probabilities over ten bins; `None` without windows.
+    pub calibration_error: Option<f64>,
 }
 
 /// Number of bins of probabilities.
@@ -82,30 +83,28 @@ impl OpponentReport {
         }
         let gap =
             bins.iter().map(|(_, confidence, correct)| f64::abs(confidence - correct)).sum::<f64>();
+        let if_any = |x: f64| (!samples.is_empty()).then_some(x);
         Some(OpponentReport {
             goal_accuracy: balanced_accuracy(&goals),
             target_accuracy: clustered_mean(&targets),
             limits_error: clustered_mean(&errors),
-            error_by_limit: LIMITS.into_iter().zip(limit_errors).collect(),
+            error_by_limit: LIMITS.into_iter().zip(limit_errors.map(if_any)).collect(),
             confusion,
-            calibration_error: gap / samples.len().max(1) as f64,
+            calibration_error: if_any(gap / samples.len() as f64),
         })
     }
 
-    /// Returns the report as text.
+    /// Returns the report as text; undefined values are `/`.
     pub fn text(&self) -> String {
+        let number = |x: Option<f64>| x.map_or_else(|| "/".to_owned(), |x| format!("{x:.3}"));
         let line = |name: &str, m: &MeanEstimate| {
-            format!(
-                "{name:<18} {:.3} ± {:.3}  ({} windows)\n",
-                m.mean,
-                1.96 * m.standard_error,
-                m.n
-            )
+            let interval = number(m.standard_error.map(|error| 1.96 * error));
+            format!("{name:<18} {} ± {interval}  ({} windows)\n", number(m.mean), m.n)
         };
         let mut text = line("goal accuracy", &self.goal_accuracy)
             + &line("target accuracy", &self.target_accuracy)
             + &line("limits, mean sq.", &self.limits_error);
-        text += &format!("calibration error  {:.3}\n\n{:<9}", self.calibration_error, "true");
+        text += &format!("calibration error  {}\n\n{:<9}", number(self.calibration_error), "true");
         for goal in OpponentGoal::ALL {
             text += &format!("{:>9}", goal.name());
         }
@@ -117,7 +116,7 @@ impl OpponentReport {
         }
         text += "\n\n";
         for (name, error) in &self.error_by_limit {
-            text += &format!("{name:<15} {error:.3}\n");
+            text += &format!("{name:<15} {}\n", number(*error));
         }
         text
     }
@@ -151,7 +150,8 @@ fn balanced_accuracy(windows: &[(u32, usize, f64)]) -> MeanEstimate {
         let (n, n_correct) = by_goal[goal];
         (*episode, (is_correct - n_correct / n) / (n * n_goals))
     });
-    MeanEstimate { mean, standard_error: clustered_error(residuals), n: windows.len() }
+    let standard_error = clustered_error(residuals);
+    MeanEstimate { mean: Some(mean), standard_error, n: windows.len() }
 }
 
 /// Returns the mean of clustered values, with the standard error of a ratio of cluster sums.
@@ -162,17 +162,17 @@ fn clustered_mean(samples: &[(u32, f64)]) -> MeanEstimate {
     }
     let mean = samples.iter().map(|(_, x)| x).sum::<f64>() / n as f64;
     let residuals = samples.iter().map(|(episode, x)| (*episode, (x - mean) / n as f64));
-    MeanEstimate { mean, standard_error: clustered_error(residuals), n }
+    MeanEstimate { mean: Some(mean), standard_error: clustered_error(residuals), n }
 }
 
 /// Returns the standard error of an estimate from the influence of each window on it, with the windows
-/// of an episode as one cluster; infinite for one episode.
-fn clustered_error(residuals: impl Iterator<Item = (u32, f64)>) -> f64 {
+/// of an episode as one cluster; `None` for fewer than two episodes.
+fn clustered_error(residuals: impl Iterator<Item = (u32, f64)>) -> Option<f64> {
     let mut clusters: BTreeMap<u32, f64> = BTreeMap::new();
     residuals.for_each(|(episode, x)| *clusters.entry(episode).or_default() += x);
     let k = clusters.len() as f64;
     let square: f64 = clusters.values().map(|sum| sum * sum).sum();
-    if k > 1.0 { (square * k / (k - 1.0)).sqrt() } else { f64::INFINITY }
+    (k > 1.0).then(|| (square * k / (k - 1.0)).sqrt())
 }
 
 #[cfg(test)]
@@ -185,15 +185,16 @@ mod tests {
         let mut windows: Vec<_> = (0..9).map(|episode| (episode, 0, 1.0)).collect();
         windows.push((9, 1, 1.0));
         let perfect = balanced_accuracy(&windows);
-        assert_eq!((perfect.mean, perfect.standard_error, perfect.n), (1.0, 0.0, 10));
+        let expected = MeanEstimate { mean: Some(1.0), standard_error: Some(0.0), n: 10 };
+        assert_eq!(perfect, expected);
         // One goal with half of four windows correct, each in an episode of its own, and one with all.
         let half: Vec<_> =
             (0..8).map(|k| (k, k as usize / 4, f64::from(u8::from(k > 1)))).collect();
         let half = balanced_accuracy(&half);
-        assert_eq!(half.mean, 0.75);
+        assert_eq!(half.mean, Some(0.75));
         let expected = (4.0f64 * (0.5 / 8.0) * (0.5 / 8.0) * 8.0 / 7.0).sqrt();
-        assert!((half.standard_error - expected).abs() < 1e-12);
+        assert!((half.standard_error.unwrap() - expected).abs() < 1e-12);
         assert_eq!(balanced_accuracy(&[]), MeanEstimate::default());
-        assert_eq!(balanced_accuracy(&[(0, 0, 1.0), (0, 1, 0.0)]).standard_error, f64::INFINITY);
+        assert_eq!(balanced_accuracy(&[(0, 0, 1.0), (0, 1, 0.0)]).standard_error, None);
     }
 }

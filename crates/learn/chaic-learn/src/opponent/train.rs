@@ -1,20 +1,21 @@
 //! Training of the opponent model.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use chaic_core::geom::math;
 use chaic_core::rng::RngStream;
 use chaic_env::Digest;
-use chaic_files::{EntryKind, kind};
+use chaic_files::{EntryKind, kind, read_bounded, write_atomically};
 use chaic_nn::weights::{self, WeightsError};
 use chaic_nn::{AdamWConfig, Network};
 use chaic_training::bounds::{
     ADAM, Bound, BoundTable, LEARNING_RATE, SEED, SHARDS, STEPS, integer, real,
 };
 use chaic_training::{
-    Checkpoint, CheckpointError, Learner, Metrics, Trainer, TrainingError, learning_rate_at,
-    metrics,
+    CONFIG, Checkpoint, CheckpointError, Learner, Metrics, Trainer, TrainingError, defined_metrics,
+    learning_rate_at, metrics,
 };
 use serde::{Deserialize, Serialize};
 
@@ -95,8 +96,64 @@ impl Default for OpponentConfig {
 /// Files of training and validation windows in the training folder.
 const WINDOWS: &str = "windows.safetensors";
 const VALIDATION_WINDOWS: &str = "validation.safetensors";
+/// File of the settings with which the windows were collected.
+const DATA_SETTINGS: &str = "data.json";
+/// Maximum size of the file of settings, bytes: a hundred times the common one.
+const MAX_SETTINGS_BYTES: u64 = 1 << 16;
 
 impl OpponentConfig {
+    /// Returns the values of the keys that decide about training and validation windows.
+    fn data_settings(&self) -> BTreeMap<String, String> {
+        let collect = serde_json::to_value(&self.collect).expect("a configuration serializes");
+        let collect = collect.as_object().into_iter().flatten();
+        let mut settings: BTreeMap<String, String> =
+            collect.map(|(key, value)| (format!("collect.{key}"), value.to_string())).collect();
+        let mut insert = |key: &str, value: String| settings.insert(key.to_owned(), value);
+        insert("held_out_fraction", self.held_out_fraction.to_string());
+        insert("validation_max_per_class", self.validation_max_per_class.to_string());
+        if self.held_out_fraction > 0.0 {
+            // It draws the windows that are held out.
+            insert("seed", self.seed.to_string());
+        }
+        settings
+    }
+
+    /// Records the settings of the windows in a training folder, once.
+    fn record_settings(&self, folder: &Path) -> Result<(), TrainingError> {
+        let path = folder.join(DATA_SETTINGS);
+        if kind(&path)? == EntryKind::Missing {
+            let settings = serde_json::to_string_pretty(&self.data_settings());
+            let settings = settings.expect("texts serialize") + "\n";
+            write_atomically(&path, settings.as_bytes())?;
+        }
+        Ok(())
+    }
+
+    /// Checks that the windows in a training folder are those of this configuration. Folders of earlier
+    /// builds have no record.
+    fn check_settings(&self, folder: &Path) -> Result<(), TrainingError> {
+        let path = folder.join(DATA_SETTINGS);
+        if kind(&path)? == EntryKind::Missing {
+            return Ok(());
+        }
+        let bytes = read_bounded(&path, MAX_SETTINGS_BYTES)?;
+        let recorded = serde_json::from_slice::<BTreeMap<String, String>>(&bytes);
+        let invalid = |e: serde_json::Error| {
+            let problem = format!("no record of settings: {e}");
+            TrainingError::from_data(CollectError::Format { path: path.clone(), problem })
+        };
+        let current = self.data_settings();
+        for (key, before) in recorded.map_err(invalid)? {
+            let Some(now) = current.get(&key).filter(|now| **now != before) else { continue };
+            let problem = format!(
+                "`{key}` is {now}, but was {before} when the windows were collected; restore it or start \
+                 a new training"
+            );
+            return Err(TrainingError::Config { path: folder.join(CONFIG), problem });
+        }
+        Ok(())
+    }
+
     /// Reads the windows of one split from the training folder, or collects and writes them; `None` if
     /// it was stopped.
     fn read_or_collect(
@@ -120,9 +177,9 @@ impl OpponentConfig {
             collect(split, &config, progress, stop).map_err(TrainingError::from_data)?;
         let Some(collected) = collected else { return Ok(None) };
         if collected.is_empty() {
-            // A file would remain after the failed start.
             return Err(TrainingError::from_data(none));
         }
+        self.record_settings(folder)?;
         write(&path, &collected, is_granted)?;
         Ok(Some(collected))
     }
@@ -192,6 +249,7 @@ impl Trainer for OpponentTrainer {
     const VALIDATION_STEPS: u64 = 1000;
     const SCORE: Option<&'static str> = Some(GOAL_ACCURACY);
     const INPUT_KEY: &'static str = "windows";
+    const DATA: &'static [&'static str] = &[WINDOWS, VALIDATION_WINDOWS, DATA_SETTINGS];
     const BOUNDS: BoundTable = &[
         ("seed", SEED),
         ("steps", STEPS),
@@ -213,6 +271,7 @@ impl Trainer for OpponentTrainer {
         progress: &mut dyn FnMut(&str),
         stop: &AtomicBool,
     ) -> Result<Option<OpponentTrainer>, TrainingError> {
+        config.check_settings(folder)?;
         // Validation windows come first: they take less time, and a training without any is refused.
         let validation = if config.held_out_fraction > 0.0 {
             None
@@ -231,6 +290,7 @@ impl Trainer for OpponentTrainer {
             let Some(windows) = windows else { return Ok(None) };
             (windows, None)
         };
+        config.record_settings(folder)?;
         let validation = validation.unwrap_or_else(|| hold_out(&mut samples, config));
         OpponentTrainer::with_windows(config, samples, validation, input).map(Some)
     }
@@ -321,7 +381,7 @@ impl Trainer for OpponentTrainer {
         let model = OpponentModel::new(parameters.clone(), is_granted);
         let report = OpponentReport::new(&model, &self.validation, stop);
         let Some(report) = report else { return Ok(None) };
-        let metrics = metrics([
+        let metrics = defined_metrics([
             (GOAL_ACCURACY, report.goal_accuracy.mean),
             ("target_accuracy", report.target_accuracy.mean),
             ("limits_error", report.limits_error.mean),

@@ -18,8 +18,8 @@ use chaic_training::bounds::{
 };
 use chaic_training::checkpoint::Identity;
 use chaic_training::{
-    Checkpoint, CheckpointError, Learner, Metrics, Trainer, TrainingError, learning_rate_at,
-    metrics,
+    Checkpoint, CheckpointError, Learner, Metrics, Trainer, TrainingError, defined_metrics,
+    learning_rate_at, metrics,
 };
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -445,15 +445,29 @@ fn imitation_metrics(
         }
     }
     let n = decisions.len().max(1) as f64;
-    let n_targets = f64::max(n_picks, 1.0);
-    metrics([
-        (LOG_LIKELIHOOD, log_likelihood / n),
-        ("accuracy", network / n),
-        ("accuracy_of_rules", rules / n),
-        ("target_accuracy", pick_network / n_targets),
-        ("target_accuracy_of_rules", pick_rules / n_targets),
-        ("target_accuracy_of_nearest", pick_nearest / n_targets),
-        ("choices", decisions.len() as f64),
-        ("target_choices", n_picks),
+    let of_targets = |n_agreeing: f64| (n_picks > 0.0).then_some(n_agreeing / n_picks);
+    defined_metrics([
+        (LOG_LIKELIHOOD, Some(log_likelihood / n)),
+        ("accuracy", Some(network / n)),
+        ("accuracy_of_rules", Some(rules / n)),
+        ("target_accuracy", of_targets(pick_network)),
+        ("target_accuracy_of_rules", of_targets(pick_rules)),
+        ("target_accuracy_of_nearest", of_targets(pick_nearest)),
+        ("choices", Some(decisions.len() as f64)),
+        ("target_choices", Some(n_picks)),
     ])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn accuracies_without_choices_of_a_target_are_undefined() {
+        let model = partner_network();
+        let parameters = model.network.init_parameters(1);
+        let metrics = imitation_metrics(&model, &parameters, &[]);
+        assert_eq!(metrics["target_choices"], 0.0);
+        assert!(!metrics.keys().any(|name| name.starts_with("target_accuracy")), "{metrics:?}");
+    }
 }

@@ -23,6 +23,9 @@ use crate::opponent::network::{OpponentInput, OpponentModel};
 use crate::opponent::tracker::OpponentTracker;
 use crate::policy::ActionSelection;
 
+/// Extension of weights files.
+pub(crate) const EXTENSION: &str = "safetensors";
+
 /// Network with parameter values.
 #[derive(Clone, Debug)]
 pub struct VisualWeights {
@@ -93,6 +96,11 @@ impl VisualPolicies {
             VisualPolicies::ByTask(policies) => policies.first().map(|(_, weights)| weights),
         };
         any.and_then(|weights| weights.opponent.clone())
+    }
+
+    /// Returns whether there is a policy for this task.
+    pub(crate) fn plays(&self, task: TaskId) -> bool {
+        self.find(Some(task)).is_some()
     }
 
     /// Returns the policy for an episode of this task, which is unknown without the grant.
@@ -250,6 +258,8 @@ const RNG_STREAM: &str = "visual policy";
 pub struct VisualHelper {
     policies: Arc<VisualPolicies>,
     encoder: ObservationEncoder,
+    /// Task of the episode, if it is granted.
+    task: Option<TaskId>,
     current: Option<CurrentPolicy>,
     rng: RngStream,
     /// Last primitive action; `None` if the policy chooses plans, which the agent describes.
@@ -272,7 +282,8 @@ impl VisualHelper {
         let (encoder, grants) = ObservationEncoder::new(rules, perception, policies.opponent());
         let grants = Grants { task: matches!(*policies, VisualPolicies::ByTask(_)), ..grants };
         let rng = RngStream::new(0, RNG_STREAM, 0);
-        let agent = VisualHelper { policies, encoder, current: None, rng, last_primitive: None };
+        let (task, current, last_primitive) = (None, None, None);
+        let agent = VisualHelper { policies, encoder, task, current, rng, last_primitive };
         Helper { agent: Box::new(agent), grants }
     }
 }
@@ -284,7 +295,8 @@ impl Agent for VisualHelper {
     }
 
     fn reset(&mut self, briefing: &Briefing) {
-        let weights = self.policies.find(briefing.disclosure.map(|disclosure| disclosure.task));
+        self.task = briefing.disclosure.map(|disclosure| disclosure.task);
+        let weights = self.policies.find(self.task);
         self.current = weights.map(|weights| {
             self.encoder.set_opponent(weights.opponent.clone());
             CurrentPolicy { weights: Arc::clone(weights), pass: weights.model.pass() }
@@ -295,9 +307,13 @@ impl Agent for VisualHelper {
 
     fn act(&mut self, observation: &Observation) -> Result<Action, AgentError> {
         let Some(CurrentPolicy { weights, pass }) = &mut self.current else {
-            let problem = "each policy of this helper is for one task: grant the task, and play one \
-                           that has a policy";
-            return Err(AgentError::Broken(problem.to_owned()));
+            return Err(AgentError::Broken(match self.task {
+                Some(task) => format!(
+                    "this helper has no policy for {task}; in a folder of policies it is the file \
+                     {task}.{EXTENSION}"
+                ),
+                None => "each policy of this helper is for one task: grant the task".to_owned(),
+            }));
         };
         let VisualWeights { model, parameters, .. } = &**weights;
         self.encoder.observe(observation);

@@ -2,7 +2,7 @@
 //! with the same bits after an interruption. Reports count correctly.
 
 use std::fs::{self, File};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use chaic_core::TaskId;
 use chaic_core::capability::Persona;
@@ -17,7 +17,8 @@ use chaic_learn::opponent::train::{OpponentConfig, OpponentTrainer};
 use chaic_learn::opponent::window::{N_CLASS, N_STATE};
 use chaic_learn::opponent::{N_LIMITS, OpponentGoal, limits};
 use chaic_training::conformance::{bounds_every_number, refuses_damaged_checkpoints};
-use chaic_training::{CHECKPOINT, CONFIG, CURVES, Trainer, TrainingError, TrainingRun};
+use chaic_training::run::checkpoint_bytes;
+use chaic_training::{CHECKPOINT, CONFIG, CURVES, Metrics, Trainer, TrainingError, TrainingRun};
 
 static NEVER_STOP: AtomicBool = AtomicBool::new(false);
 
@@ -118,24 +119,31 @@ fn the_model_learns_and_interruption_changes_no_bit() {
     };
     let folder = tempfile::tempdir().unwrap();
     let mut ignore_progress = |_: &str| ();
-    let stop = AtomicBool::new(false);
-    let checkpoints = [false, true].map(|is_paused| {
+    let ends = [false, true].map(|is_paused| {
         let out = folder.path().join(format!("{is_paused}"));
-        let started =
-            TrainingRun::<OpponentTrainer>::start(&out, &config, None, &mut ignore_progress, &stop);
+        let started = TrainingRun::<OpponentTrainer>::start(
+            &out,
+            &config,
+            None,
+            &mut ignore_progress,
+            &NEVER_STOP,
+        );
         let mut run = started.unwrap().unwrap();
         if is_paused {
-            // The flag is checked before the first step, which is then not taken.
-            stop.store(true, Ordering::Relaxed);
-            assert!(!run.run(&stop, &mut |_| {}).unwrap());
-            stop.store(false, Ordering::Relaxed);
             drop(run);
-            run = TrainingRun::resume(&out, &mut ignore_progress, &stop).unwrap().unwrap();
+            // After these steps, optimizer and averages differ from those of a new training.
+            let trainer = OpponentTrainer::new(&config, &out, &mut ignore_progress, &NEVER_STOP);
+            let mut trainer = trainer.unwrap().unwrap();
+            let taken: Vec<Metrics> =
+                (0..7).map(|_| trainer.step(&NEVER_STOP).unwrap().unwrap()).collect();
+            fs::write(out.join(CHECKPOINT), checkpoint_bytes(&trainer, &taken).unwrap()).unwrap();
+            run = TrainingRun::resume(&out, &mut ignore_progress, &NEVER_STOP).unwrap().unwrap();
+            assert_eq!(run.progress(), (7, 60));
         }
-        assert!(run.run(&stop, &mut |_| {}).unwrap());
-        fs::read(out.join(CHECKPOINT)).unwrap()
+        assert!(run.run(&NEVER_STOP, &mut |_| {}).unwrap());
+        [CHECKPOINT, CURVES, OpponentTrainer::WEIGHTS].map(|name| fs::read(out.join(name)).unwrap())
     });
-    assert!(checkpoints[0] == checkpoints[1]);
+    assert!(ends[0] == ends[1]);
     let out = folder.path().join("false");
     let curves = fs::read_to_string(out.join(CURVES)).unwrap();
     assert!(curves.contains("goal_accuracy"), "{curves}");
@@ -150,11 +158,10 @@ fn the_model_learns_and_interruption_changes_no_bit() {
         &NEVER_STOP,
     );
     let (learned, initial) = (learned.unwrap(), initial.unwrap());
-    assert!(
-        learned.goal_accuracy.mean > initial.goal_accuracy.mean + 0.3,
-        "{learned:?} {initial:?}"
-    );
-    assert!(learned.limits_error.mean < initial.limits_error.mean, "{learned:?} {initial:?}");
+    let [accuracy, before] = [&learned, &initial].map(|report| report.goal_accuracy.mean.unwrap());
+    assert!(accuracy > before + 0.3, "{learned:?} {initial:?}");
+    let [error, before] = [&learned, &initial].map(|report| report.limits_error.mean.unwrap());
+    assert!(error < before, "{learned:?} {initial:?}");
 }
 
 #[test]
@@ -171,6 +178,47 @@ fn a_fraction_of_the_training_windows_can_validate() {
     assert!(run.unwrap().unwrap().run(&NEVER_STOP, &mut |_| {}).unwrap());
     assert!(out.join(OpponentTrainer::WEIGHTS).exists());
     assert!(!out.join("validation.safetensors").exists(), "no other episode was played");
+    // The training continues only with the settings of its windows.
+    let resume =
+        || TrainingRun::<OpponentTrainer>::resume(&out, &mut |_| (), &NEVER_STOP).map(drop);
+    let text = fs::read_to_string(out.join(CONFIG)).unwrap();
+    for (before, after, problem) in [
+        ("image_size = 64", "image_size = 80", "`collect.image_size` is 80, but was 64 when"),
+        ("held_out_fraction = 0.25", "held_out_fraction = 0.5", "`held_out_fraction` is 0.5"),
+        ("held_out_fraction = 0.25", "held_out_fraction = 0.0", "`held_out_fraction` is 0, but"),
+        ("seed = 1", "seed = 2", "`seed` is 2, but was 1 when the windows were collected"),
+    ] {
+        assert!(text.contains(before), "{text}");
+        fs::write(out.join(CONFIG), text.replacen(before, after, 1)).unwrap();
+        let refused = resume().unwrap_err();
+        assert!(refused.is_usage(), "{refused}");
+        let refused = refused.to_string();
+        assert!(refused.contains(problem) && !refused.contains('\n'), "{refused}");
+    }
+    fs::write(out.join(CONFIG), text.replacen("steps = 2", "steps = 3", 1)).unwrap();
+    resume().unwrap();
+    // A folder of an earlier build has no record of its settings.
+    fs::remove_file(out.join("data.json")).unwrap();
+    fs::write(out.join(CONFIG), text.replacen("image_size = 64", "image_size = 80", 1)).unwrap();
+    resume().unwrap();
+}
+
+/// Learned recognition strips the grant, so its windows would be labeled wrongly.
+#[test]
+fn granted_windows_need_granted_behavior() {
+    let config = |behavior: &str, granted| WindowCollectionConfig {
+        behavior: behavior.to_owned(),
+        granted,
+        ..WindowCollectionConfig::default()
+    };
+    for (behavior, granted) in [("gt", true), ("gt", false), ("learned", false)] {
+        assert_eq!(config(behavior, granted).check(), Ok(()));
+    }
+    let problem = config("learned", true).check().unwrap_err();
+    assert!(
+        problem.starts_with("`collect.granted` needs `collect.behavior = \"gt\"`"),
+        "{problem}"
+    );
 }
 
 /// Returns a window without features.
@@ -265,8 +313,32 @@ fn reports_weight_goals_equally() {
     let is_correct =
         [OpponentGoal::Unknown, OpponentGoal::Pick].iter().any(|goal| goal.index() == predicted);
     let accuracy = if is_correct { 0.5 } else { 0.0 };
-    assert!((report.goal_accuracy.mean - accuracy).abs() < 1e-9, "{report:?}");
+    assert!((report.goal_accuracy.mean.unwrap() - accuracy).abs() < 1e-9, "{report:?}");
     assert_eq!((report.goal_accuracy.n, report.target_accuracy.n), (10, 1));
+}
+
+#[test]
+fn undefined_values_of_a_report_are_slashes_and_null() {
+    let model = OpponentModel::new(network().network.init_parameters(1), false);
+    let report = |samples: &[LabeledWindow]| {
+        let report = OpponentReport::new(&model, samples, &NEVER_STOP).unwrap();
+        (report.text(), serde_json::to_value(&report).unwrap())
+    };
+    // Two windows of one episode, none of them with a target.
+    let (text, json) = report(&[sample(OpponentGoal::Wait, 3), sample(OpponentGoal::Wait, 3)]);
+    assert!(text.contains("target accuracy    / ± /  (0 windows)"), "{text}");
+    assert!(json["goal_accuracy"]["mean"].is_f64(), "{json}");
+    for (value, key) in [
+        ("goal_accuracy", "standard_error"),
+        ("target_accuracy", "mean"),
+        ("target_accuracy", "standard_error"),
+    ] {
+        assert!(json[value][key].is_null(), "{json}");
+    }
+    let (text, json) = report(&[]);
+    assert!(!text.contains("0.000") && text.contains("calibration error  /\n"), "{text}");
+    assert!(json["calibration_error"].is_null(), "{json}");
+    assert!(json["error_of_limit"]["strength"].is_null(), "{json}");
 }
 
 #[test]

@@ -150,8 +150,13 @@ fn the_name_of_a_bundled_helper_is_taken() {
     write_visual_policy(&file, OpponentInput::None, 1);
     let name = BundledHelper::all()[0].name;
     let policy = NamedPolicy::read(name, &file).unwrap();
-    let refused = bundled().with_policies(vec![policy]).err().unwrap().to_string();
+    let error = bundled().with_policies(vec![policy]).err().unwrap();
+    let refused = error.to_string();
     assert!(refused.contains(&format!("there is a helper `{name}` already")), "{refused}");
+    assert!(error.is_usage());
+    let policy = NamedPolicy::read("a b", &file).unwrap();
+    let error = bundled().with_policies(vec![policy]).err().unwrap();
+    assert!(error.is_usage() && error.to_string().contains("not a valid name"), "{error}");
 }
 
 #[test]
@@ -176,7 +181,15 @@ fn a_folder_of_weights_is_a_policy_per_task() {
     let [first, second] = files.each_ref().map(|file| play(make(file), tasks[0]).unwrap());
     assert_ne!(first, second, "the two policies differ");
     let problem = play(make(folder.path()), TaskId::LowTarget).unwrap_err().to_string();
-    assert!(problem.contains("grant the task"), "{problem}");
+    assert!(problem.contains("no policy for low_target"), "{problem}");
+    assert!(problem.contains("the file low_target.safetensors"), "{problem}");
+    // A run is refused before it plays.
+    let registry_of_both = registry(folder.path());
+    assert!(tasks.iter().all(|task| registry_of_both.check_task("mine", *task).is_ok()));
+    let problem = registry_of_both.check_task("mine", TaskId::LowTarget).unwrap_err();
+    let expected = format!("{} has no low_target.safetensors", folder.path().display());
+    assert!(problem.starts_with(&expected), "{problem}");
+    assert!(registry(&files[0]).check_task("mine", TaskId::LowTarget).is_ok());
     let digest = make(folder.path()).agent.weights();
     write_visual_policy(&files[1], OpponentInput::None, 3);
     assert_ne!(make(folder.path()).agent.weights(), digest, "every file counts");

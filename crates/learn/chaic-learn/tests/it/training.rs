@@ -27,7 +27,7 @@ use chaic_nn::weights;
 use chaic_training::conformance::{bounds_every_number, refuses_damaged_checkpoints};
 use chaic_training::run::checkpoint_bytes;
 use chaic_training::{
-    CHECKPOINT, CURVES, Trainer, TrainingError, TrainingRun, parse_config, read_config_with,
+    CHECKPOINT, CONFIG, CURVES, Trainer, TrainingError, TrainingRun, parse_config, read_config_with,
 };
 
 static NEVER_STOP: AtomicBool = AtomicBool::new(false);
@@ -131,6 +131,15 @@ fn experts_generators_and_penalties_are_checked_before_a_training() {
     let problem = started.err().unwrap().to_string();
     assert!(problem.contains("kl_coef") && problem.contains("--weights"), "{problem}");
     assert!(!out.exists());
+    // A resumed training takes no weights.
+    let config = PpoTrainingConfig { rollout: small_rollout(), ..PpoTrainingConfig::default() };
+    type PpoRun = TrainingRun<PolicyTrainer<PpoTrainingConfig>>;
+    drop(PpoRun::start(&out, &config, None, &mut |_| (), &NEVER_STOP).unwrap().unwrap());
+    let text = fs::read_to_string(out.join(CONFIG)).unwrap();
+    fs::write(out.join(CONFIG), text.replace("kl_coef = 0.0", "kl_coef = 0.5")).unwrap();
+    let resumed = PpoRun::resume(&out, &mut |_| (), &NEVER_STOP);
+    let problem = resumed.err().unwrap().to_string();
+    assert!(problem.contains("only a new training takes by --weights"), "{problem}");
     for (text, words) in [
         ("[expert]\nhelper = \"random\"", ["expert.helper", "follow, rhp, oracle"]),
         ("[rollout]\nsplits = [\"test\"]", ["rollout.splits", "gen, gen-standard"]),
@@ -268,6 +277,20 @@ fn configurations_that_exceed_memory_are_refused_by_key() {
         let problem = parse_config::<VisualTrainer>(text).unwrap_err();
         assert!(names.iter().all(|name| problem.contains(name)), "{problem}");
     }
+    // Demonstrations take 16 GiB at most.
+    let clone = |max_episodes: usize, n_past_decisions: usize| {
+        let rollout = format!("[rollout]\nn_past_decisions = {n_past_decisions}");
+        parse_config::<PolicyTrainer<CloningConfig>>(&format!(
+            "max_episodes = {max_episodes}\n{rollout}"
+        ))
+    };
+    let default = CloningConfig::default().max_episodes;
+    for (max_episodes, n_past_decisions) in [(default, 8), (default, 32), (100_000, 0)] {
+        assert!(clone(max_episodes, n_past_decisions).is_ok(), "{max_episodes}");
+    }
+    let problem = clone(100_000, 8).unwrap_err();
+    let names = ["`max_episodes` is 100000", "`rollout.n_past_decisions = 8`", "1 to 37347"];
+    assert!(names.iter().all(|name| problem.contains(name)), "{problem}");
 }
 
 /// Raises the flag after a delay, as a signal may at any time.

@@ -22,6 +22,8 @@ pub struct Clip {
     /// True if another interaction is in progress. The label is then moving; reports exclude such
     /// clips.
     pub is_mixed: bool,
+    /// Number of its episode. Clips of one episode are not independent.
+    pub episode: u32,
     /// [`CROPS`] and [`SLACK`] crops, oldest first.
     pub crops: Vec<PersonCrop>,
 }

@@ -33,7 +33,7 @@ use crate::trained::TrainedDetector;
 use crate::views::DatasetSplit;
 
 /// Minimum fraction of crops that show the person (paper: 20 % of an action's observations).
-const MIN_VISIBLE_FRACTION: f32 = 0.2;
+const MIN_SEEN_FRACTION: f32 = 0.2;
 /// Crops between the starts of two clips of a moving person.
 const MOVING_STEP: usize = 24;
 /// Clips exclude interactions that ended within this time before their end, frames.
@@ -179,7 +179,9 @@ fn episode_clips(
         return Vec::new();
     }
     let crops = crops.lock().unwrap_or_else(PoisonError::into_inner);
-    interactions.clips(&crops)
+    let mut clips = interactions.clips(&crops);
+    clips.iter_mut().for_each(|clip| clip.episode = index as u32);
+    clips
 }
 
 /// Behavior model that records crops of the partner.
@@ -306,7 +308,8 @@ fn clip_at(crops: &[PersonCrop], first: usize, label: Behavior, is_mixed: bool) 
     let crops = crops.get(first..first + CROPS + SLACK)?;
     let is_contiguous =
         crops.windows(2).all(|pair| pair[1].frame == pair[0].frame + HISTORY.every_frames);
-    let n_visible = crops[..CROPS].iter().filter(|crop| !crop.is_blank()).count();
-    let is_visible = n_visible as f32 >= MIN_VISIBLE_FRACTION * CROPS as f32;
-    (is_contiguous && is_visible).then(|| Clip { label, is_mixed, crops: crops.to_vec() })
+    let n_seen = crops[..CROPS].iter().filter(|crop| crop.is_seen).count();
+    let is_seen = n_seen as f32 >= MIN_SEEN_FRACTION * CROPS as f32;
+    let clip = || Clip { label, is_mixed, episode: 0, crops: crops.to_vec() };
+    (is_contiguous && is_seen).then(clip)
 }

@@ -21,7 +21,7 @@ pub struct ClipCollectionConfig {
     #[serde(alias = "learned")]
     pub learned_fraction: f32,
     /// Fraction of episodes recorded by helpers with the error rates of the bundled detector and noisy
-    /// positions of the partner. They take a twentieth of the time.
+    /// positions of the partner. They take a small part of the time.
     pub noisy_fraction: f32,
 }
 
@@ -29,11 +29,11 @@ impl Default for ClipCollectionConfig {
     fn default() -> ClipCollectionConfig {
         ClipCollectionConfig {
             seed: 1,
-            max_per_class: 900,
-            episodes: 1000,
+            max_per_class: 1200,
+            episodes: 700,
             varied_fraction: 0.35,
             learned_fraction: 0.0,
-            noisy_fraction: 0.0,
+            noisy_fraction: 0.6,
         }
     }
 }

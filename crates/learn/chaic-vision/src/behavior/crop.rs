@@ -33,6 +33,9 @@ pub struct PersonCrop {
     pub distance_m: f32,
     /// Horizontal speed, meters per frame.
     pub speed: f32,
+    /// True if the helper detected the person when it received the image. Other crops show the place where
+    /// the person is assumed to be.
+    pub is_seen: bool,
     /// Color, shape [`SIDE`, `SIDE`, 3]; empty if the person is not visible.
     pub rgb: Vec<u8>,
     /// Depth, shape [`SIDE`, `SIDE`]: 128 at the person's distance, 0 outside of the image.
@@ -42,7 +45,14 @@ pub struct PersonCrop {
 impl PersonCrop {
     /// Creates a crop without a person.
     pub fn blank(frame: Frame) -> PersonCrop {
-        PersonCrop { frame, distance_m: 0.0, speed: 0.0, rgb: Vec::new(), depth: Vec::new() }
+        PersonCrop {
+            frame,
+            distance_m: 0.0,
+            speed: 0.0,
+            is_seen: false,
+            rgb: Vec::new(),
+            depth: Vec::new(),
+        }
     }
 
     /// Returns whether the crop shows no person.
@@ -55,7 +65,7 @@ impl PersonCrop {
         (f32::from(depth) - 128.0) * DEPTH_STEP_M
     }
 
-    /// Crops the person at this position, who moves at this speed.
+    /// Crops the person at this position, who moves at this speed and is not seen.
     pub fn new(image: &HistoryFrame, position_in_world: Vec3, speed: f32) -> PersonCrop {
         let HistoryFrame { frame, camera, images } = image;
         let blank = PersonCrop::blank(*frame);
@@ -125,15 +135,18 @@ pub struct PersonCropper {
 
 impl PersonCropper {
     /// Returns a crop of each image since the last observation, given the person's position if visible
-    /// `now`. Positions between two sightings are interpolated linearly. After the last sighting the person
-    /// is assumed to stand still for a while, since detectors miss people in single images.
+    /// `now`. Positions between two sightings are interpolated linearly, also during a long action of the
+    /// helper. After the last sighting the person is assumed to stand still for a while, since detectors
+    /// miss people in single images.
     pub fn crop(
         &mut self,
         now: Frame,
         images: &[HistoryFrame],
         position_in_world: Option<Vec3>,
     ) -> Vec<PersonCrop> {
-        let previous = self.last.filter(|last| last.frame + MAX_AGE_FRAMES > now);
+        let is_recent = |last: &Sighting, frame: Frame| last.frame + MAX_AGE_FRAMES > frame;
+        let start = images.first().map_or(now, |image| image.frame);
+        let previous = self.last.filter(|last| is_recent(last, start));
         let current = position_in_world.map(|at| match previous {
             Some(previous) => previous.follow(at),
             None => at,
@@ -155,11 +168,14 @@ impl PersonCropper {
                 let fraction = elapsed / (now - previous.frame) as f32;
                 Some(from + fraction.min(1.0) * (to - from))
             }
-            (previous, current) => current.or(previous.map(|last| last.position_in_world)),
+            (_, Some(to)) => Some(to),
+            (Some(last), None) => is_recent(&last, frame).then_some(last.position_in_world),
+            (None, None) => None,
         };
-        let crop = |image: &HistoryFrame| match at(image.frame) {
-            Some(at) => PersonCrop::new(image, at, speed),
-            None => PersonCrop::blank(image.frame),
+        let crop = |image: &HistoryFrame| {
+            let Some(at) = at(image.frame) else { return PersonCrop::blank(image.frame) };
+            let crop = PersonCrop::new(image, at, speed);
+            PersonCrop { is_seen: position_in_world.is_some() && !crop.is_blank(), ..crop }
         };
         images.iter().map(crop).collect()
     }

@@ -1,4 +1,5 @@
-//! Behavior network: strided convolutions over each crop, then a binary tree over time.
+//! Behavior network: strided convolutions over each crop, convolutions over time, then a binary
+//! tree over time.
 
 use chaic_nn::simd::widest;
 use chaic_nn::weights::WeightsError;
@@ -9,9 +10,11 @@ use super::clip::{CROPS, ClipAugmentation, N_CHANNELS, fill_input};
 use super::crop::{PersonCrop, SIDE};
 
 /// Channels after each convolution of a crop; each halves the resolution.
-const CROP_CHANNELS: [usize; 4] = [16, 32, 48, 64];
+const CROP_CHANNELS: [usize; 4] = [32, 48, 80, 112];
 /// Channels of a crop's embedding.
 const EMBEDDING_CHANNELS: usize = 64;
+/// Residual layers that read the previous, the same and the next crop.
+const TEMPORAL_LAYERS: usize = 2;
 const TREE_CHANNELS: [usize; 5] = [96, 96, 128, 128, 128];
 
 /// Behavior network.
@@ -44,6 +47,13 @@ impl BehaviorNetwork {
         features = net.flatten(features, size);
         features = net.conv("moment", features, Kernel::POINTWISE, EMBEDDING_CHANNELS);
         features = net.norm_relu("moment.norm", features);
+        for k in 0..TEMPORAL_LAYERS {
+            let neighbors = net.concat_neighbors(features, CROPS);
+            let name = format!("time{k}");
+            let change = net.conv(&name, neighbors, Kernel::POINTWISE, EMBEDDING_CHANNELS);
+            let change = net.norm_relu(&format!("{name}.norm"), change);
+            features = net.add(features, change);
+        }
         for (k, channels) in TREE_CHANNELS.into_iter().enumerate() {
             features = net.concat_pairs(features);
             features = net.conv(&format!("pair{k}"), features, Kernel::POINTWISE, channels);
@@ -71,7 +81,7 @@ pub struct TrainedBehavior {
 }
 
 /// Kind in weights files.
-const KIND: &str = "chaic behavior 2";
+const KIND: &str = "chaic behavior 3";
 
 /// Returns the network together with the temperature of the file.
 fn file_layout(network: &BehaviorNetwork) -> Network {

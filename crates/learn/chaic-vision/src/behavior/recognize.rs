@@ -28,7 +28,7 @@ pub struct RecognizerConfig {
     /// Minimum probability of a reported behavior (original: 0.6).
     pub min_confidence: f32,
     /// Minimum fraction of a clip's crops that show the person.
-    pub min_visible_fraction: f32,
+    pub min_seen_fraction: f32,
     /// Frames within which a behavior is not reported again, since clips overlap.
     pub refractory_frames: Frame,
     /// Maximum horizontal distance between the person and the object of an action, meters.
@@ -39,7 +39,7 @@ impl Default for RecognizerConfig {
     fn default() -> RecognizerConfig {
         RecognizerConfig {
             min_confidence: 0.6,
-            min_visible_fraction: 0.2,
+            min_seen_fraction: 0.2,
             refractory_frames: 45,
             reach_m: 2.0,
         }
@@ -148,8 +148,8 @@ impl LearnedBehavior {
             return None;
         }
         self.n_new = 0;
-        let n_visible = self.crops.iter().filter(|crop| !crop.is_blank()).count();
-        if (n_visible as f32) < self.config.min_visible_fraction * CROPS as f32 {
+        let n_seen = self.crops.iter().filter(|crop| crop.is_seen).count();
+        if (n_seen as f32) < self.config.min_seen_fraction * CROPS as f32 {
             return None;
         }
         let outputs = self.model.outputs(self.crops.make_contiguous(), 0, &mut self.pass);

@@ -9,6 +9,7 @@ use super::Behavior;
 use super::clip::{Clip, SLACK};
 use super::network::{BehaviorScores, TrainedBehavior, softmax};
 use crate::parallel::map_in_order;
+use crate::track_evaluation::Rate;
 
 const N: usize = Behavior::ALL.len();
 
@@ -17,16 +18,18 @@ const N: usize = Behavior::ALL.len();
 pub struct BehaviorReport {
     /// Number of evaluated clips.
     pub clips: usize,
-    /// Fraction of correctly classified clips.
-    pub top1: f64,
-    /// Half width of the 95 % interval of `top1` (normal approximation).
-    pub interval: f64,
-    /// Mean recall over behaviors.
-    pub balanced: f64,
-    /// Expected calibration error over ten bins.
-    pub calibration_error: f64,
-    /// Fraction of mixed clips that are classified as moving.
-    pub mixed_as_moving: f64,
+    /// Number of episodes with evaluated clips.
+    pub episodes: usize,
+    /// Fraction of correctly classified clips; `None` without clips.
+    pub top1: Option<f64>,
+    /// Half width of the 95 % interval of `top1` over episodes; `None` with fewer than two.
+    pub interval: Option<f64>,
+    /// Mean recall over the behaviors that occur; `None` without clips.
+    pub balanced: Option<f64>,
+    /// Expected calibration error over ten bins; `None` without clips.
+    pub calibration_error: Option<f64>,
+    /// Fraction of mixed clips that are classified as moving; `None` without mixed clips.
+    pub mixed_as_moving: Option<f64>,
     /// Number of clips by true and predicted behavior.
     pub confusion: BTreeMap<&'static str, BTreeMap<&'static str, usize>>,
 }
@@ -67,30 +70,37 @@ pub fn report(
         outputs.iter().map(|o| most_probable(&trained.probabilities(o))).collect();
     let mut counts = [[0usize; N]; N];
     let mut scored = Vec::new();
-    let (mut n_mixed, mut n_mixed_correct) = (0usize, 0usize);
+    // Correct and all clips of each episode.
+    let mut by_episode: BTreeMap<u32, [usize; 2]> = BTreeMap::new();
+    let mut mixed = [0usize; 2];
     for (clip, (behavior, probability)) in clips.iter().zip(predictions) {
         if clip.is_mixed {
-            n_mixed += 1;
-            n_mixed_correct += usize::from(behavior == Behavior::Moving);
+            mixed[0] += usize::from(behavior == Behavior::Moving);
+            mixed[1] += 1;
             continue;
         }
+        let is_correct = behavior == clip.label;
         counts[clip.label.index()][behavior.index()] += 1;
-        scored.push((probability, behavior == clip.label));
+        scored.push((probability, is_correct));
+        let episode = by_episode.entry(clip.episode).or_default();
+        episode[0] += usize::from(is_correct);
+        episode[1] += 1;
     }
-    let n = scored.len().max(1) as f64;
-    let top1 = scored.iter().filter(|(_, is_correct)| *is_correct).count() as f64 / n;
+    let top1 = Rate::new(by_episode.values().copied());
     let rows = counts.iter().enumerate().filter(|(_, row)| row.iter().sum::<usize>() > 0);
     let recalls: Vec<f64> =
         rows.map(|(k, row)| row[k] as f64 / row.iter().sum::<usize>() as f64).collect();
+    let has_clips = !scored.is_empty();
     let counts_by_name =
         |row: &[usize; N]| Behavior::ALL.map(Behavior::name).into_iter().zip(*row).collect();
     Some(BehaviorReport {
         clips: scored.len(),
-        top1,
-        interval: 1.96 * (top1 * (1.0 - top1) / n).sqrt(),
-        balanced: recalls.iter().sum::<f64>() / recalls.len().max(1) as f64,
-        calibration_error: crate::calibration::calibration_error(&scored),
-        mixed_as_moving: n_mixed_correct as f64 / n_mixed.max(1) as f64,
+        episodes: by_episode.len(),
+        top1: top1.value,
+        interval: top1.interval,
+        balanced: has_clips.then(|| recalls.iter().sum::<f64>() / recalls.len() as f64),
+        calibration_error: has_clips.then(|| crate::calibration::calibration_error(&scored)),
+        mixed_as_moving: Rate::new(std::iter::once(mixed)).value,
         confusion: Behavior::ALL
             .iter()
             .map(|b| (b.name(), counts_by_name(&counts[b.index()])))

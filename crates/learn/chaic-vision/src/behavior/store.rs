@@ -17,6 +17,8 @@ use crate::views::DatasetSplit;
 
 /// File of the collection's configuration.
 const CONFIG: &str = "rules.toml";
+/// Version of the clips: increased when the meaning of a crop changes.
+const CLIPS_VERSION: i64 = 3;
 /// Maximum size of a file, bytes.
 const MAX_BYTES: u64 = 1 << 30;
 /// Crops of a clip.
@@ -37,8 +39,10 @@ pub enum StoreError {
         /// Cause.
         problem: String,
     },
-    /// The folder holds clips of another configuration.
-    #[error("{0} has clips of another configuration; choose another folder, or remove it")]
+    /// The folder holds clips of another configuration or version.
+    #[error(
+        "{0} has clips of another configuration or version; choose another folder, or remove it"
+    )]
     Config(PathBuf),
     /// There are no clips to train on.
     #[error("the episodes gave no clips to train on; set collect.episodes to a larger number")]
@@ -60,7 +64,7 @@ impl ClipFolder {
     /// Opens a folder, or creates it.
     ///
     /// # Errors
-    /// If the folder has clips of another configuration or perception, or a file cannot be read or written.
+    /// If the folder has clips of another configuration, perception or version, or a file cannot be read or written.
     pub fn open(
         folder: &Path,
         split: DatasetSplit,
@@ -71,7 +75,7 @@ impl ClipFolder {
         let path = folder.join(CONFIG);
         let perception = perception.name().unwrap_or_else(|| GROUND_TRUTH.to_owned());
         let text = format!(
-            "part = \"{split}\"\nperception = {}\n{}",
+            "part = \"{split}\"\nclips_version = {CLIPS_VERSION}\nperception = {}\n{}",
             toml::Value::from(&*perception),
             toml::to_string(config).expect("the configuration has string keys only")
         );
@@ -82,9 +86,8 @@ impl ClipFolder {
         let found = parse_config(&read_bounded(&path, MAX_BYTES)?);
         let is_same = found.is_some_and(|(found_split, found_perception, found_config)| {
             found_split.as_str() == Some(&*split.to_string())
+                && found_perception.as_str() == Some(&*perception)
                 && found_config == *config
-                // Earlier versions did not write the perception.
-                && found_perception.is_none_or(|found| found.as_str() == Some(&*perception))
         });
         match is_same {
             true => Ok(ClipFolder(folder.to_owned())),
@@ -120,16 +123,19 @@ impl ClipFolder {
     }
 }
 
-/// Parses a configuration file into split, perception and configuration; `None` if it is not one. Keys
-/// may be those of an earlier version.
-fn parse_config(text: &[u8]) -> Option<(toml::Value, Option<toml::Value>, ClipCollectionConfig)> {
+/// Parses a configuration file into split, perception and configuration; `None` if it is not one of
+/// this version.
+fn parse_config(text: &[u8]) -> Option<(toml::Value, toml::Value, ClipCollectionConfig)> {
     let mut table: toml::Table = std::str::from_utf8(text).ok()?.parse().ok()?;
-    let (split, perception) = (table.remove("part")?, table.remove("perception"));
+    if table.remove("clips_version")?.as_integer() != Some(CLIPS_VERSION) {
+        return None;
+    }
+    let (split, perception) = (table.remove("part")?, table.remove("perception")?);
     Some((split, perception, table.try_into().ok()?))
 }
 
 /// Tensors of a file: name, type and shape per clip.
-const TENSORS: [(&str, Dtype, &[usize]); 7] = [
+const TENSORS: [(&str, Dtype, &[usize]); 9] = [
     ("label", Dtype::U8, &[]),
     ("mixed", Dtype::U8, &[]),
     ("frame", Dtype::U32, &[N_CROPS]),
@@ -137,6 +143,8 @@ const TENSORS: [(&str, Dtype, &[usize]); 7] = [
     ("speed", Dtype::F32, &[N_CROPS]),
     ("rgb", Dtype::U8, &[N_CROPS, SIDE, SIDE, 3]),
     ("depth", Dtype::U8, &[N_CROPS, SIDE, SIDE]),
+    ("seen", Dtype::U8, &[N_CROPS]),
+    ("episode", Dtype::U32, &[]),
 ];
 
 /// Serializes clips as safetensors; crops without a person are black, at distance 0.
@@ -163,6 +171,8 @@ pub fn to_bytes(clips: &[Clip]) -> Vec<u8> {
         crop_values(&|crop| crop.speed.to_le_bytes()),
         images(|crop| &crop.rgb, 3 * N_PIXELS),
         images(|crop| &crop.depth, N_PIXELS),
+        clips.iter().flat_map(|clip| &clip.crops).map(|crop| u8::from(crop.is_seen)).collect(),
+        clips.iter().flat_map(|clip| clip.episode.to_le_bytes()).collect(),
     ];
     let views = TENSORS.iter().zip(&columns).map(|((name, dtype, clip_shape), bytes)| {
         let shape = std::iter::once(clips.len()).chain(clip_shape.iter().copied()).collect();
@@ -202,6 +212,7 @@ fn from_bytes(bytes: &[u8]) -> Result<Vec<Clip>, String> {
                 frame,
                 distance_m,
                 speed,
+                is_seen: columns[7][k] != 0,
                 rgb: image(5, 3 * N_PIXELS),
                 depth: image(6, N_PIXELS),
             },
@@ -211,7 +222,8 @@ fn from_bytes(bytes: &[u8]) -> Result<Vec<Clip>, String> {
         let label = Behavior::ALL.get(usize::from(columns[0][k])).ok_or("no such behavior")?;
         let crops: Result<Vec<PersonCrop>, String> =
             (N_CROPS * k..N_CROPS * (k + 1)).map(crop).collect();
-        Ok(Clip { label: *label, is_mixed: columns[1][k] != 0, crops: crops? })
+        let (is_mixed, episode) = (columns[1][k] != 0, u32::from_le_bytes(bytes_at(8, k)));
+        Ok(Clip { label: *label, is_mixed, episode, crops: crops? })
     };
     (0..n).map(clip).collect()
 }
@@ -230,13 +242,14 @@ mod tests {
             frame,
             distance_m: 2.5,
             speed: 0.01,
+            is_seen: frame % 3 == 0,
             rgb: (0..3 * N_PIXELS).map(|k| (k % 251) as u8).collect(),
             depth: vec![7; N_PIXELS],
         };
         let frames = (0..N_CROPS as Frame).map(|k| first + 3 * k);
         let crops =
             frames.map(|f| if f % 2 == 0 { visible(f) } else { PersonCrop::blank(f) }).collect();
-        Clip { label, is_mixed: label == Behavior::Moving, crops }
+        Clip { label, is_mixed: label == Behavior::Moving, episode: 70_000 + first, crops }
     }
 
     fn open(
@@ -272,14 +285,19 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_of_an_earlier_version_is_opened() {
+    fn a_folder_of_an_earlier_version_is_refused() {
         let dir = tempfile::tempdir().unwrap();
-        let text = "part = \"Training\"\nseed = 1\nof_each = 900\nepisodes = 1000\n\
-                    varied = 0.35\nlearned = 0.0\n";
-        fs::write(dir.path().join(CONFIG), text).unwrap();
         let config = ClipCollectionConfig::default();
         open(dir.path(), DatasetSplit::Train, &config).unwrap();
-        assert!(open(dir.path(), DatasetSplit::Validation, &config).is_err());
+        let text = fs::read_to_string(dir.path().join(CONFIG)).unwrap();
+        let version = format!("clips_version = {CLIPS_VERSION}\n");
+        for other in ["", "clips_version = 2\n"] {
+            fs::write(dir.path().join(CONFIG), text.replace(&version, other)).unwrap();
+            let opened = open(dir.path(), DatasetSplit::Train, &config);
+            assert!(matches!(opened, Err(StoreError::Config(_))), "{other}");
+        }
+        fs::write(dir.path().join(CONFIG), text).unwrap();
+        open(dir.path(), DatasetSplit::Train, &config).unwrap();
     }
 
     #[test]

@@ -86,6 +86,27 @@ fn crops_ignore_small_displacements_and_bridge_images_without_the_person() {
 }
 
 #[test]
+fn crops_follow_the_person_during_a_long_action() {
+    let mut cropper = PersonCropper::default();
+    let image = |frame: Frame| HistoryFrame { frame, ..history_frame(4.0) };
+    let at = |distance_m: f32| Some(Vec3::new(0.0, 0.9, -distance_m));
+    assert!(cropper.crop(0, &[image(0)], at(3.0))[0].is_seen);
+    // An action of 60 frames, longer than the maximum age of a sighting.
+    let images: Vec<HistoryFrame> = (1..=20).map(|k| image(3 * k)).collect();
+    let seen = cropper.clone().crop(60, &images, at(5.1));
+    let distances_m: Vec<f32> = seen.iter().map(|crop| crop.distance_m).collect();
+    for (k, distance_m) in [(0, 3.1), (9, 4.0), (19, 5.0)] {
+        assert!((distances_m[k] - distance_m).abs() < 1e-3, "{distances_m:?}");
+    }
+    assert!(seen.iter().all(|crop| crop.is_seen));
+    // Without another sighting the place is known for 45 frames.
+    let assumed = cropper.crop(60, &images, None);
+    let is_blank: Vec<bool> = assumed.iter().map(PersonCrop::is_blank).collect();
+    assert!(!is_blank[13] && is_blank[14], "{is_blank:?}");
+    assert!(assumed.iter().all(|crop| !crop.is_seen));
+}
+
+#[test]
 fn position_noise_has_the_documented_quantiles() {
     let mut rng = RngStream::new(1, "noise", 0);
     let error_m = |_| with_noise(Vec3::ZERO, &mut rng).length();
@@ -155,8 +176,8 @@ fn clips_are_contiguous_show_the_person_and_do_not_depend_on_threads() {
         assert_eq!(clip.crops.len(), CROPS + SLACK);
         let frames = clip.crops.windows(2).map(|pair| pair[1].frame - pair[0].frame);
         assert!(frames.into_iter().all(|n| n == HISTORY.every_frames));
-        let n_visible = clip.crops[..CROPS].iter().filter(|crop| !crop.is_blank()).count();
-        assert!(5 * n_visible >= CROPS && (!clip.is_mixed || clip.label == Behavior::Moving));
+        let n_seen = clip.crops[..CROPS].iter().filter(|crop| crop.is_seen).count();
+        assert!(5 * n_seen >= CROPS && (!clip.is_mixed || clip.label == Behavior::Moving));
     }
 }
 
@@ -166,12 +187,14 @@ fn synthetic_clips() -> Vec<Clip> {
         frame: HISTORY.every_frames * k as u32,
         distance_m: 2.0,
         speed: 0.01,
+        is_seen: true,
         rgb: (0..3 * SIDE * SIDE).map(|c| if c % 3 == 0 { red } else { 90 }).collect(),
         depth: vec![128; SIDE * SIDE],
     };
     let clip = |label, red| Clip {
         label,
         is_mixed: false,
+        episode: 0,
         crops: (0..CROPS + SLACK).map(|k| crop(red, k)).collect(),
     };
     vec![clip(Behavior::PickedUp, 10), clip(Behavior::PutIn, 245)]
@@ -210,6 +233,12 @@ fn the_network_learns_resumes_and_is_read_back() {
     assert_eq!(Some(&outputs), all_outputs(&read, &synthetic_clips(), 2, &NEVER_STOP).as_ref());
     let found = report(&read, &synthetic_clips(), 1, &NEVER_STOP).unwrap();
     assert_eq!((found.clips, found.confusion["put in"].values().sum::<usize>()), (2, 1));
+    assert_eq!((found.episodes, found.interval, found.mixed_as_moving), (1, None, None));
+    let of_two = synthetic_clips().into_iter().enumerate();
+    let of_two: Vec<Clip> = of_two.map(|(k, clip)| Clip { episode: k as u32, ..clip }).collect();
+    let found = report(&read, &of_two, 1, &NEVER_STOP).unwrap();
+    assert!(found.episodes == 2 && found.interval.is_some());
+    assert_eq!(report(&read, &[], 1, &NEVER_STOP).unwrap().top1, None);
     assert!(softmax(&outputs[0]).iter().sum::<f32>() > 0.999);
 }
 

@@ -10,8 +10,8 @@ use chaic_training::bounds::{
     ADAM, Bound, BoundTable, FRACTION, LEARNING_RATE, SEED, SHARDS, STEPS, integer,
 };
 use chaic_training::{
-    Checkpoint, CheckpointError, Learner, Metrics, Trainer, TrainingError, learning_rate_at,
-    metrics,
+    Checkpoint, CheckpointError, Learner, Metrics, Trainer, TrainingError, defined_metrics,
+    learning_rate_at, metrics,
 };
 use serde::{Deserialize, Serialize};
 
@@ -64,12 +64,13 @@ impl Default for BehaviorTrainingConfig {
     fn default() -> BehaviorTrainingConfig {
         BehaviorTrainingConfig {
             seed: 1,
-            steps: 6_000,
-            learning_rate: 2e-3,
+            steps: 13_000,
+            // At 2e-3 the validation accuracy is 0.45 after 2,000 steps, at 1e-3 it is 0.78.
+            learning_rate: 1e-3,
             warm_up: 100,
             shards: 2,
             batch_size: 8,
-            mixed_fraction: 0.6,
+            mixed_fraction: 0.7,
             label_smoothing: 0.05,
             collect: ClipCollectionConfig::default(),
             adam: AdamWConfig { weight_decay: 0.05, ..AdamWConfig::default() },
@@ -192,6 +193,7 @@ impl Trainer for BehaviorTrainer {
     type Config = BehaviorTrainingConfig;
     const KIND: &'static str = "behavior";
     const WEIGHTS: &'static str = "behavior.safetensors";
+    const DATA: &'static [&'static str] = &["clips"];
     const BOUNDS: BoundTable = &[
         ("seed", SEED),
         ("steps", STEPS),
@@ -296,7 +298,7 @@ impl Trainer for BehaviorTrainer {
         trained.inverse_temperature = calibrate(&self.validation, &outputs);
         let evaluation = report(&trained, &self.validation, THREADS, stop);
         let Some(evaluation) = evaluation else { return Ok(None) };
-        let metrics = metrics([
+        let metrics = defined_metrics([
             ("top1", evaluation.top1),
             ("balanced", evaluation.balanced),
             ("mixed_as_moving", evaluation.mixed_as_moving),

@@ -1,5 +1,5 @@
 //! Promises: perfect detections are tracked and remembered; errors lower the scores; the nearest
-//! pairs of one class match; people are found near their position only.
+//! pairs of one class match; people are found near their position only; no episode is played twice.
 
 use chaic_agents::perception::SegmentMeasurement;
 
@@ -16,10 +16,11 @@ fn report_of(noise: DetectorNoiseModel) -> TrackReport {
 fn perfect_detections_are_remembered_and_errors_lower_the_scores() {
     let perfect = report_of(DetectorNoiseModel::none());
     assert!(perfect.episodes == 2 && perfect.failures.is_empty(), "{perfect:?}");
-    assert!(perfect.detection_precision.value > 0.99, "{perfect:?}");
-    assert!(perfect.detection_recall.value > 0.95, "{perfect:?}");
-    assert!(perfect.memory_recall.value > 0.9, "{perfect:?}");
-    assert!(perfect.person_precision.value > 0.99 && perfect.person_recall.value > 0.99);
+    let value = |rate: Rate| rate.value.unwrap();
+    assert!(value(perfect.detection_precision) > 0.99, "{perfect:?}");
+    assert!(value(perfect.detection_recall) > 0.95, "{perfect:?}");
+    assert!(value(perfect.memory_recall) > 0.9, "{perfect:?}");
+    assert!(value(perfect.person_precision) > 0.99 && value(perfect.person_recall) > 0.99);
     // Nearly all objects are first detected within 10 m.
     let n = perfect.memory_precision.n;
     let in_range: usize = perfect.memory_precision_by_m.values().map(|rate| rate.n).sum();
@@ -29,9 +30,43 @@ fn perfect_detections_are_remembered_and_errors_lower_the_scores() {
         false_positives_per_image: 0.2,
         ..DetectorNoiseModel::none()
     });
-    assert!(noisy.detection_precision.value < perfect.detection_precision.value, "{noisy:?}");
-    assert!(noisy.memory_precision.value < perfect.memory_precision.value, "{noisy:?}");
-    assert!(noisy.identity_switches.value > perfect.identity_switches.value, "{noisy:?}");
+    let values = |rate: fn(&TrackReport) -> Rate| [&noisy, &perfect].map(|r| value(rate(r)));
+    let [noisy_precision, perfect_precision] = values(|report| report.detection_precision);
+    assert!(noisy_precision < perfect_precision, "{noisy:?}");
+    let [noisy_precision, perfect_precision] = values(|report| report.memory_precision);
+    assert!(noisy_precision < perfect_precision, "{noisy:?}");
+    let [noisy_switches, perfect_switches] = values(|report| report.identity_switches);
+    assert!(noisy_switches > perfect_switches, "{noisy:?}");
+}
+
+#[test]
+fn ratios_without_counts_and_intervals_of_one_episode_are_undefined() {
+    let rate = |counts: &[[usize; 2]]| Rate::new(counts.iter().copied());
+    let undefined = Rate { value: None, interval: None, n: 0 };
+    assert_eq!(rate(&[]), undefined);
+    assert_eq!(rate(&[[0, 0], [0, 0]]), undefined);
+    let one_episode = Rate { value: Some(0.5), interval: None, n: 4 };
+    assert_eq!(rate(&[[2, 4]]), one_episode);
+    assert_eq!(rate(&[[0, 0], [2, 4], [0, 0]]), one_episode);
+    assert_eq!(rate(&[[1, 2], [2, 4]]), Rate { value: Some(0.5), interval: Some(0.0), n: 6 });
+    // Without any image, the confidences have no calibration error either.
+    assert_eq!(TrackReport::new(&[EpisodeRecord::default()]).calibration_error, None);
+}
+
+#[test]
+fn no_episode_is_played_twice_whichever_seeds_are_invalid() {
+    let n_tasks = TaskId::paper().count() as u64;
+    for split in [DatasetSplit::Validation, DatasetSplit::Test] {
+        let n_seeds = SeedRange::perception(split).count;
+        let mut episodes = BTreeSet::new();
+        for k in 0..u64::from(MAX_EPISODES) {
+            for attempt in 0..MAX_ATTEMPTS {
+                let position = seed_position(k, attempt, n_seeds);
+                assert!(position < n_seeds);
+                assert!(episodes.insert((k % n_tasks, position)), "{k}, attempt {attempt}");
+            }
+        }
+    }
 }
 
 #[test]
@@ -104,5 +139,6 @@ fn the_nearest_pairs_of_one_class_match() {
     assert_eq!(record.memory_precision([2.0, 4.0]), [1, 2]);
     assert_eq!(record.memory_precision([4.0, 10.0]), [0, 0]);
     let rate = Rate::new([[1, 2], [3, 4]].into_iter());
-    assert!((rate.value - 4.0 / 6.0).abs() < 1e-9 && rate.interval > 0.0 && rate.n == 6);
+    assert!((rate.value.unwrap() - 4.0 / 6.0).abs() < 1e-9 && rate.n == 6);
+    assert!(rate.interval > Some(0.0));
 }

@@ -142,7 +142,9 @@ fn check_task(setup: &Setup, found: &mut Vec<Problem>) {
     let riders = setup.people.iter().filter(|p| p.capability().gait == Gait::WalkBike).count();
     let vehicles = setup.things.iter().filter(|t| t.class.info().role == Role::Vehicle).count();
     if riders > vehicles {
-        let problem = format!("hold {vehicles} bicycles for {riders} people who need one");
+        let bicycles = if vehicles == 1 { "bicycle" } else { "bicycles" };
+        let people = if riders == 1 { "person who needs one" } else { "people who need one" };
+        let problem = format!("hold {vehicles} {bicycles} for {riders} {people}");
         found.push(Problem::new("things", problem));
     }
 }

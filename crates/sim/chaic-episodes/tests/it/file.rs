@@ -164,6 +164,16 @@ fn the_number_of_people_is_limited_by_agent_ids() {
 }
 
 #[test]
+fn every_rider_needs_a_bicycle() {
+    let mut setup = find_episode("shopping/test/00").expect("bundled").into_setup();
+    setup.people.push(setup.people[0]);
+    let problems: Vec<String> =
+        chaic_episodes::validate(&setup).iter().map(ToString::to_string).collect();
+    let expected = "hold 1 bicycle for 2 people who need one";
+    assert!(problems.iter().any(|problem| problem.contains(expected)), "{problems:?}");
+}
+
+#[test]
 fn intersecting_and_unsupported_objects_are_refused() {
     let at_wall = |f: &mut Value| {
         let wall = f["setup"]["walls"][0].clone();

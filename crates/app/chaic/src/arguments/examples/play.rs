@@ -227,7 +227,8 @@ pub(super) const EXAMPLES: &[CommandExamples] = &[
             ("Run a built-in helper as a process", "chaic helper serve rhp"),
             (
                 "Play that process in a benchmark",
-                "chaic eval --helper 'served=exec:chaic helper serve rhp' --n-episodes 1",
+                "chaic eval --helper 'exec:chaic helper serve rhp' --exec-grants ids,goal_place \
+                 --n-episodes 1",
             ),
         ],
     ),
@@ -244,7 +245,10 @@ pub(super) const EXAMPLES: &[CommandExamples] = &[
         [
             ("Serve the rule-based planner", "chaic helper serve rhp"),
             ("Serve it with the original's rules", "chaic helper serve rhp --rules compat"),
-            ("Test a served helper", "chaic helper check 'chaic helper serve random'"),
+            (
+                "Test a served helper",
+                "chaic helper check 'chaic helper serve random' --exec-grants ids,goal_place",
+            ),
         ],
     ),
     (

@@ -220,6 +220,62 @@ fn parts_with_other_episodes_or_results_are_refused() {
 }
 
 #[test]
+fn parts_played_with_other_commands_are_refused() {
+    let helpers = TestHelpers::new();
+    let (dir, parts) = shards(&helpers);
+    let out = dir.path().join("out");
+    let (mine, other) =
+        (r#"{"name": "mine", "command": "a.py"}"#, r#"{"name": "other", "command": "b.py"}"#);
+    let record = |part: usize, commands: &str| {
+        write(&parts[part], "commands.json", commands.as_bytes());
+    };
+    let refused = || {
+        let error = merge(&out, &parts).unwrap_err();
+        assert!(error.is_usage() && !out.exists(), "{error}");
+        error.to_string()
+    };
+    // The second part has no commands, others, and no valid ones.
+    record(0, &format!("[{mine}, {other}]"));
+    assert!(refused().contains("were played with other commands; play all shards with the same"));
+    record(1, &format!("[{mine}]"));
+    assert!(refused().contains("were played with other commands"));
+    record(1, &format!("[{mine}, {other}").replace("a.py", "c.py"));
+    assert!(matches!(merge(&out, &parts), Err(EvalError::Env(EnvError::Unreadable { .. }))));
+    record(1, &format!("[{mine}, {other}]").replace("a.py", "c.py"));
+    assert!(refused().contains("were played with other commands"));
+    // A run that is resumed may name them in another order.
+    record(1, &format!("[{other}, {mine}]"));
+    drop(merge(&out, &parts).unwrap());
+    let commands = |folder: &Path| fs::read(folder.join("commands.json")).unwrap();
+    assert_eq!(commands(&out), commands(&parts[0]));
+    drop(reopen_merged(&out, &parts).unwrap());
+    record(1, &format!("[{other}]"));
+    let error = reopen_merged(&out, &parts).unwrap_err();
+    assert!(matches!(error, EvalError::NotEmpty { .. }), "{error}");
+}
+
+#[test]
+fn a_result_is_merged_if_one_of_the_parts_has_its_trace() {
+    let helpers = TestHelpers::new();
+    let (dir, parts) = shards(&helpers);
+    let reference = dir.path().join("reference");
+    drop(merge(&reference, &parts).unwrap());
+    let copy = dir.path().join("copy");
+    files_below(&parts[0]).iter().for_each(|(name, bytes)| write(&copy, name, bytes));
+    let trace = RunFolder::read(&copy).unwrap().0.traces().unwrap().remove(0);
+    fs::remove_file(trace).unwrap();
+    for (name, order) in
+        [("before", [&copy, &parts[0], &parts[1]]), ("after", [&parts[0], &parts[1], &copy])]
+    {
+        let out = dir.path().join(name);
+        drop(merge(&out, &order.map(PathBuf::clone)).unwrap());
+        assert!(files_below(&out) == files_below(&reference), "the copy comes {name} its original");
+    }
+    let error = merge(&dir.path().join("out"), &[copy, parts[1].clone()]).unwrap_err();
+    assert!(matches!(error, EvalError::Untraced { .. }), "{error}");
+}
+
+#[test]
 fn results_without_traces_are_played_again() {
     let files = episode_files(&[TaskId::LowTarget, TaskId::Shopping], 1);
     let dir = tempfile::tempdir().unwrap();

@@ -141,6 +141,48 @@ fn files_of_others_are_never_removed() {
     assert_eq!(files_below(&path).len(), 1);
 }
 
+/// Helpers without the weights of one task.
+struct WithoutObstacle(TestHelpers);
+
+impl HelperRegistry for WithoutObstacle {
+    fn names(&self) -> Vec<String> {
+        self.0.names()
+    }
+
+    fn make(&self, name: &str, rules: PlannerRules) -> Option<Helper> {
+        self.0.make(name, rules)
+    }
+
+    fn check_task(&self, name: &str, task: TaskId) -> std::result::Result<(), String> {
+        let is_missing = name == "turner" && task == TaskId::Obstacle;
+        if is_missing { Err("no weights of obstacle".to_owned()) } else { Ok(()) }
+    }
+}
+
+#[test]
+fn a_task_without_an_episode_or_a_helper_that_plays_it_is_refused() {
+    let source = episode_files(&[TaskId::LowTarget, TaskId::Obstacle], 1);
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("run");
+    let helpers = WithoutObstacle(TestHelpers::new());
+    let all = request(&source, &["none", "turner"]);
+    let empty = RunRequest {
+        episodes: Some(dir.path().to_owned()),
+        tasks: Some(vec![TaskId::LowTarget]),
+        ..all.clone()
+    };
+    for (request, problem) in [
+        (&all, "no weights of obstacle".to_owned()),
+        (&empty, format!("{} holds no episode file (*.json) of low_target", dir.path().display())),
+    ] {
+        let error = Run::open(&path, FolderMode::New, request, &helpers).unwrap_err();
+        assert!(error.is_usage() && error.to_string() == problem, "{error}");
+        assert!(!path.exists());
+    }
+    let low = RunRequest { tasks: Some(vec![TaskId::LowTarget]), ..all };
+    Run::open(&path, FolderMode::New, &low, &helpers).unwrap();
+}
+
 #[test]
 fn invalid_requests_write_nothing() {
     let source = episode_files(&[TaskId::LowTarget], 1);

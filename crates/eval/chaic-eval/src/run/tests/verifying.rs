@@ -115,8 +115,9 @@ fn weights_that_agents_lack_are_no_part_of_traces() {
     let (run, path, dir) = played_once(&helpers);
     let text = fs::read_to_string(&path).unwrap();
     let (first, rest) = text.split_once('\n').unwrap();
-    let message = "differs from the one that this run writes: people";
-    for agent in [AgentId::PARTNER, AgentId::HELPER] {
+    let people = "differs from the one that this run writes: people";
+    let weights = "run.json names other weights of the helper";
+    for (agent, message) in [(AgentId::PARTNER, people), (AgentId::HELPER, weights)] {
         let mut header: Header = serde_json::from_str(first).unwrap();
         header.people[agent.index()].weights = Some("0123456789abcdef".to_owned());
         let forged = serde_json::to_string(&header).unwrap();
@@ -133,7 +134,7 @@ fn weights_that_agents_lack_are_no_part_of_traces() {
     let (folder, options) = RunFolder::read(dir.path()).unwrap();
     let report = crate::verify::verify_run(&folder, &options, &helpers, 1, &|_| ());
     let problems = report.map_or_else(|e| e.to_string(), |r| format!("{:?}", r.mismatches));
-    assert!(problems.contains(message), "{problems}");
+    assert!(problems.contains(people), "{problems}");
 }
 
 #[test]
@@ -169,7 +170,7 @@ fn verification_counts_results_and_compares_the_report() {
     let files = ["scores.json", "report.md", "figure.svg"];
     assert_eq!(report().report, compared(&files, &[]));
     assert!(!report().is_good() && report().findings.is_empty());
-    // Results without diagnostic metrics, as older versions wrote them, and with a wrong value.
+    // Results without diagnostic metrics, and with a wrong value.
     let journal = run.folder().results();
     let lines = fs::read_to_string(&journal).unwrap();
     let changed = |change: &dyn Fn(&mut serde_json::Value)| {
@@ -183,7 +184,7 @@ fn verification_counts_results_and_compares_the_report() {
     };
     let measured = |r: &serde_json::Value| r.get("measures").is_some();
     assert!(lines.lines().any(|l| measured(&serde_json::from_str(l).unwrap())), "{lines}");
-    assert_eq!(changed(&|r| drop(r.as_object_mut().unwrap().remove("measures"))), 0);
+    assert!(changed(&|r| drop(r.as_object_mut().unwrap().remove("measures"))) > 0);
     let n_altered = changed(&|r| {
         if measured(r) {
             r["measures"]["partner_failures"] = 0.125.into();
@@ -282,6 +283,13 @@ fn a_run_of_another_version_and_older_forms_of_traces_verify() {
         fs::write(&path, text).unwrap();
         assert_eq!(verified(&run, &helpers), [""; 0], "version {version}");
     }
+    // Older versions wrote no diagnostic metrics.
+    let journal = run.folder().results();
+    let mut result: serde_json::Value =
+        serde_json::from_slice(&fs::read(&journal).unwrap()).unwrap();
+    assert!(result.as_object_mut().unwrap().remove("measures").is_some());
+    fs::write(&journal, format!("{result}\n")).unwrap();
+    assert_eq!(verified(&run, &helpers), [""; 0]);
 }
 
 /// Agent that waits in a process of its own, and has trained weights.
@@ -353,6 +361,8 @@ fn weights_perception_and_isolation_in_traces_are_those_of_the_run() {
     let (trace, _) = crate::trace_file::read(&path).unwrap();
     let people = "differs from the one that this run writes: people";
     let perception = "run.json names another perception of the helper";
+    let isolation = "run.json names another isolation of the helper";
+    let weights = "run.json names other weights of the helper";
     // Problems with agents whose weights have changed since, and with unknown agents.
     let changes: [(AgentId, HeaderChange, [&str; 2]); 10] = [
         (AgentId::PARTNER, |_| (), ["", ""]),
@@ -361,9 +371,9 @@ fn weights_perception_and_isolation_in_traces_are_those_of_the_run() {
         (AgentId::PARTNER, |p| p.isolation = other(), [people, ""]),
         (AgentId::PARTNER, |p| p.weights = None, [people, ""]),
         (AgentId::PARTNER, |p| p.grants.goal = true, [people, people]),
-        (AgentId::HELPER, |p| p.weights = other(), [people, people]),
-        (AgentId::HELPER, |p| p.weights = None, [people, people]),
-        (AgentId::HELPER, |p| p.isolation = other(), [people, people]),
+        (AgentId::HELPER, |p| p.weights = other(), [weights, weights]),
+        (AgentId::HELPER, |p| p.weights = None, [weights, weights]),
+        (AgentId::HELPER, |p| p.isolation = other(), [isolation, isolation]),
         (AgentId::HELPER, |p| p.perception = other(), [perception, perception]),
         (AgentId::HELPER, |p| p.grants.goal = true, [people, people]),
     ];
@@ -506,8 +516,12 @@ fn the_first_differing_or_additional_record_is_named() {
 #[test]
 fn counters_belong_to_agents_that_are_not_built_in() {
     let helpers = TestHelpers::new();
-    let runs: [(Option<&str>, &[&str]); 2] =
-        [(None, &["helper.calls"]), (Some("slow"), &["helper.calls", "partner.calls"])];
+    let runs: [(Option<&str>, &[&str]); 4] = [
+        (None, &["helper.calls"]),
+        (Some("slow"), &["helper.calls"]),
+        (Some("habits:memory=90,noise=10"), &["helper.calls"]),
+        (Some("stranger"), &["helper.calls", "partner.calls"]),
+    ];
     for (partner, allowed) in runs {
         let (run, _, _dir) = played_with(&helpers, partner);
         let journal = run.folder().results();

@@ -14,9 +14,11 @@ use chaic_training::conformance::{bounds_every_number, refuses_damaged_checkpoin
 use chaic_training::run::checkpoint_bytes;
 use chaic_training::{
     CHECKPOINT, CONFIG, CURVES, Checkpoint, CheckpointError, CurveRecord, INITIAL_WEIGHTS, Learner,
-    Metrics, Phase, Trainer, TrainingError, TrainingRun, metrics, parse_config, read_config_with,
+    Metrics, Phase, Trainer, TrainingError, TrainingRun, metrics,
 };
 use serde::{Deserialize, Serialize};
+
+mod configuration;
 
 /// File in the folder that interrupts the next validation.
 const INTERRUPT: &str = "interrupt";
@@ -82,6 +84,7 @@ impl<const HAS_SCORE: bool> Trainer for Toy<HAS_SCORE> {
     const VALIDATION_STEPS: u64 = 8;
     const SCORE: Option<&'static str> = if HAS_SCORE { Some("score") } else { None };
     const INPUT_KEY: &'static str = "input";
+    const DATA: &'static [&'static str] = &["clips", "windows", "missing"];
 
     fn new(
         config: &ToyConfig,
@@ -90,6 +93,9 @@ impl<const HAS_SCORE: bool> Trainer for Toy<HAS_SCORE> {
         stop: &AtomicBool,
     ) -> Result<Option<Toy<HAS_SCORE>>, TrainingError> {
         if config.fails == 1 {
+            fs::create_dir_all(folder.join("clips/train")).unwrap();
+            fs::write(folder.join("clips/train/0"), "").unwrap();
+            fs::write(folder.join("windows"), "").unwrap();
             return Err(TrainingError::from_data(std::io::Error::other("no data")));
         }
         let learner = Learner::new(&network(), 1, 2);
@@ -402,7 +408,8 @@ fn a_failed_start_leaves_nothing_to_resume() {
     fs::create_dir(&out).unwrap();
     let fails = ToyConfig { fails: 1, ..ToyConfig::default() };
     assert!(TrainingRun::<Toy>::start(&out, &fails, None, &mut |_| (), &never).is_err());
-    assert!(resume(&out).is_err());
+    let error = resume(&out).err().unwrap().to_string();
+    assert!(error.contains("out holds no training"), "{error}");
     assert!(run_to_end(&mut start(&out, &ToyConfig::default()), &mut |_, _| ()));
     assert!(resume(&out).is_ok(), "a finished training can be resumed and has no steps left");
 }
@@ -531,35 +538,18 @@ fn a_training_is_resumed_only_with_the_data_with_which_it_began() {
 }
 
 #[test]
-fn old_keys_have_bounds_and_exclude_the_current_ones() {
-    let parsed = parse_config::<Toy>;
-    assert_eq!(parsed("rate = 0.5"), parsed("learning_rate = 0.5"));
-    for (text, expected) in [
-        ("rate = 2.0", "`learning_rate` is 2; it must be from 0 to 1"),
-        ("rate = 0.5\nlearning_rate = 0.5", "duplicate field `learning_rate`: it is set under"),
-        ("speed = 0.5", "unknown field `speed`"),
-    ] {
-        let problem = parsed(text).unwrap_err();
-        assert!(problem.contains(expected) && !problem.contains('\n'), "{problem}");
-    }
-}
-
-#[test]
-fn assignments_may_have_old_keys() {
-    let read = |assignments: &[&str]| {
-        let assignments: Vec<String> = assignments.iter().map(|text| (*text).to_owned()).collect();
-        read_config_with::<Toy>(None, &assignments)
-    };
-    let expected = ToyConfig { learning_rate: 0.5, a: 1, ..ToyConfig::default() };
-    assert_eq!(read(&["rate=0.5", "a=1"]).unwrap(), expected);
-    assert_eq!(read(&["rate=0.25", "a=1", "learning_rate=0.5"]).unwrap(), expected);
-    for (assignment, expected) in [
-        ("rate=2.0", "`learning_rate` is 2; it must be from 0 to 1"),
-        ("speed=0.5", "unknown field `speed`"),
-    ] {
-        let problem = read(&[assignment]).unwrap_err().to_string();
-        assert!(problem.contains(expected) && !problem.contains('\n'), "{problem}");
-    }
+fn the_training_of_another_kind_is_named() {
+    let dir = tempfile::tempdir().unwrap();
+    drop(start(dir.path(), &ToyConfig::default()));
+    let path = dir.path().join(CONFIG);
+    fs::write(&path, "other = 1\n").unwrap();
+    let error = resume(dir.path()).err().unwrap().to_string();
+    assert!(error.contains("config.toml: line 1: unknown field `other`"), "{error}");
+    let checkpoint = Checkpoint::default().to_bytes(&Identity::new("other", &network())).unwrap();
+    fs::write(dir.path().join(CHECKPOINT), checkpoint).unwrap();
+    let error = resume(dir.path()).err().unwrap().to_string();
+    let expected = "holds a training of `chaic train other`, not of `chaic train toy`";
+    assert!(error.contains(expected) && !error.contains('\n'), "{error}");
 }
 
 #[test]

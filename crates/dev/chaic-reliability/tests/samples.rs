@@ -110,10 +110,13 @@ fn a_submission_is_extracted_completely_or_not_at_all() {
     std::fs::write(mine.join("submission.toml"), &manifest).expect("the disk has space");
     let path = |name: &str| at.join(name).to_str().expect("the path is UTF-8").to_owned();
     let (mine, out, temporary) = (path("mine"), path("out"), path("out/submission.tmp"));
+    let episodes = path("episodes");
+    let generate = ["chaic", "--", "episodes", "generate", "--task", "shopping", "--seeds", "0..1"];
+    run_ok(&[&generate[..], &["--out", &episodes]].concat());
     // Operations on the temporary folder: create and rename; of an interrupted extraction, remove before.
     let play = |fault: &str, index: &str| {
         let plan = ["chaic", "--fault", fault, "--path", &temporary, "--at", index, "--"];
-        let command = ["submit", "run", &mine, "--episodes", "none", "--out", &out];
+        let command = ["submit", "run", &mine, "--episodes", &episodes, "--out", &out];
         let mut program = Command::new(env!("CARGO_BIN_EXE_chaic-reliability"));
         // A crash leaves temporary files.
         let program = program.args(plan).args(command).env("TMPDIR", at);

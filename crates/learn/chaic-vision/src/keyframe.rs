@@ -1,5 +1,5 @@
 //! Keyframes: while the agent turns in place, the detector processes every third image. The others
-//! reuse the detections of the last keyframe.
+//! reuse the detections of the last keyframe. If it shows a person, all images are processed.
 
 use chaic_agents::perception::{Detection, Percepts, STRIDE};
 use chaic_core::geom::{Pose, horizontal_distance, wrap_angle};
@@ -41,14 +41,17 @@ impl Keyframe {
     }
 
     /// Returns whether an image is similar enough to reuse the detections: the agent has only turned
-    /// since, and by less than the limits.
+    /// since, and by less than the limits, and the keyframe shows no person. People walk, and crops of
+    /// their behavior need their positions.
     pub fn is_similar(&self, observation: &Observation) -> bool {
         let own = &observation.proprioception;
         let has_turned =
             matches!(own.last, Some((Action::TurnLeft | Action::TurnRight, Outcome::Success)));
         let turn_rad = wrap_angle(own.pose.yaw_rad - self.pose.yaw_rad).abs();
         let step_m = horizontal_distance(own.pose.position, self.pose.position);
+        let has_people = self.detections.iter().any(|(d, _)| d.person.is_some());
         has_turned
+            && !has_people
             && turn_rad <= MAX_TURN_RAD
             && step_m <= MAX_STEP_M
             && observation.frame - self.frame <= MAX_AGE
@@ -57,14 +60,12 @@ impl Keyframe {
     /// Returns the detections whose objects are still visible in an image, at their new pixels. No pixel
     /// counts as static structure, since the masks of the objects are unknown.
     pub fn reuse(&self, observation: &Observation, depth_m: &[f32]) -> Percepts {
-        /// Maximum difference between the depth of a point and that of the image, meters; of people it
-        /// is larger, because they walk.
-        const MAX_DEPTH_ERROR_M: [f32; 2] = [0.1, 0.3];
+        /// Maximum difference between the depth of a point and that of the image, meters.
+        const MAX_DEPTH_ERROR_M: f32 = 0.1;
         let camera = &observation.camera;
         let visible = |(detection, point): &(Detection, Vec3)| {
             let (pixel, depth, visible_m) = depths_at(*point, depth_m, camera)?;
-            let max_error_m = MAX_DEPTH_ERROR_M[usize::from(detection.person.is_some())];
-            let is_visible = (visible_m - depth).abs() <= max_error_m;
+            let is_visible = (visible_m - depth).abs() <= MAX_DEPTH_ERROR_M;
             is_visible.then(|| Detection { pixel, ..detection.clone() })
         };
         let n_samples = camera.width.div_ceil(STRIDE) * camera.height.div_ceil(STRIDE);
@@ -163,6 +164,7 @@ mod tests {
             other.proprioception.last = last;
             assert!(!seen.is_similar(&other), "{last:?}");
         }
+        assert!(!keyframe("person", Some(AgentId::PARTNER)).is_similar(&here));
     }
 
     #[test]
@@ -184,8 +186,5 @@ mod tests {
         assert!(pixels(0.0, 2.0).is_empty(), "occluded");
         assert!(pixels(0.0, 4.0).is_empty(), "gone");
         assert!(pixels(0.0, f32::NAN).is_empty(), "without depth");
-        let person = keyframe("person", Some(AgentId::PARTNER));
-        let walking = person.reuse(&observation(0.0, Vec3::ZERO, 2), &[3.2; N_PX]);
-        assert_eq!(walking.detections.len(), 1);
     }
 }

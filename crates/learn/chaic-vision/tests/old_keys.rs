@@ -52,7 +52,7 @@ fn old_keys_are_read_and_conflicting_and_unknown_keys_are_refused() {
         &[
             ("of_each", "max_per_class", "5"),
             ("varied", "varied_fraction", "0.5"),
-            ("learned", "learned_fraction", "0.75"),
+            ("learned", "learned_fraction", "0.25"),
         ],
     );
 }

@@ -142,5 +142,5 @@ fn a_bundled_helper_is_listed_played_and_verified() {
     let run: serde_json::Value = serde_json::from_str(&text).expect("it is JSON");
     let digest = run["granted"]["weights"]["cloned"].as_str().expect("a digest");
     fs::write(&file, text.replace(digest, "000000000000")).expect("it is written");
-    assert!(run_err(at, &["verify", "run"]).contains("the first line differs"));
+    assert!(run_err(at, &["verify", "run"]).contains("names other weights"));
 }

@@ -93,7 +93,7 @@ fn the_record_says_how_a_helper_was_confined() {
     assert!(run_err(dir.path(), &resume).contains("start a new run"));
     let json = fs::read_to_string(open.join("run.json")).expect("it exists");
     fs::write(open.join("run.json"), json.replace("\"trusted\"", "\"sandbox\"")).expect("room");
-    assert!(run_err(dir.path(), &["verify", "open"]).contains("people"));
+    assert!(run_err(dir.path(), &["verify", "open"]).contains("names another isolation"));
 }
 
 fn trusted_arguments() -> [&'static str; 3] {

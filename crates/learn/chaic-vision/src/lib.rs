@@ -10,9 +10,10 @@
 //!   (inference).
 //! - Both stages: [`train`] (training loop), [`calibration`] (scores), [`trained`] (weights file).
 //! - Evaluation: [`average_precision`], [`error_breakdown`] (errors by cause), [`evaluate`].
-//! - Perception for agents: [`tracker`], [`perception`] (detector and tracker), [`noisy`] (ground
-//!   truth with simulated errors), [`behavior`] (action recognition), [`perception_registry`] (all
-//!   of them by name), [`track_evaluation`] (accuracy of tracks over whole episodes).
+//! - Perception for agents: [`tracker`], [`perception`] (detector, keyframes and
+//!   tracker), [`noisy`] (ground truth with simulated errors), [`behavior`] (action recognition),
+//!   [`perception_registry`] (all of them by name), [`track_evaluation`] (accuracy of tracks over
+//!   whole episodes).
 //!
 //! **What it is not**: it knows no goals, rules or policies.
 //!

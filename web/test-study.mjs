@@ -190,6 +190,28 @@ test("a reload loses nothing and goes on at the checkpoint", async () => {
   await context.close();
 });
 
+test("a reload in the last episode leads to the end and completes the participation", async () => {
+  const [own, path] = ["plain.toml", "plain.html"].map((name) => join(folder, name));
+  writeFileSync(own, STUDY.replace(/practice.*\n/, "").replace(/\[forms\][^]*/, ""));
+  execFileSync(chaic, ["study", "build", own, "--out", path]);
+  const { page, context } = await open("#1", { path });
+  await page.getByRole("button", { name: "I agree" }).click();
+  await page.getByRole("button", { name: "Continue" }).click();
+  for (const title of [/^Episode 1 of 2$/, /^Episode 2 of 2$/]) {
+    await heading(page, title);
+    await page.getByRole("button", { name: "Start the episode" }).click();
+    await playTo(page, 20);
+    await page.reload();
+  }
+  await heading(page, "The end");
+  const kept = await records(page);
+  assert.deepEqual(kept.slice(-2).map((record) => record.type), ["trial_end", "complete"]);
+  await page.reload();
+  await heading(page, "The end");
+  assert.equal((await records(page)).length, kept.length);
+  await context.close();
+});
+
 test("stopping deletes all data, also in an episode", async () => {
   const { page, context } = await open("#2");
   await page.getByRole("button", { name: "I agree" }).click();
@@ -470,6 +492,8 @@ test("a participation with a server gives data that verify", { skip }, async () 
   assert.equal(readFileSync(await download.path(), "utf8"), text);
   await tabTo(page, /^Remove the copy/);
   await page.getByText("The copy in this browser is removed").waitFor();
+  // The page has no token any more, so it must not promise to delete the data on the server.
+  assert.ok(await page.getByRole("button", { name: "Stop and delete" }).isDisabled());
   assert.equal(await databases(page), 0);
   await page.reload();
   await heading(page, "Help with high shelves");

@@ -146,7 +146,7 @@ class World:
         """True if the episode has ended."""
     def advance(self, until: int | None = None) -> str:
         """Runs the episode until an agent of the caller needs an action (`"needs_action"`), the episode has `"ended"`, or
-        an agent waits in a frame at or after `until` (`"stopped"`)."""
+        an agent waits in a frame at or after `until` (`"stopped"`). After Ctrl-C, the next call continues."""
     def waiting(self) -> list[int]:
         """Returns the agents of the caller that need an action now."""
     def briefing(self, agent: int = 1) -> Briefing:
@@ -339,7 +339,7 @@ def tasks() -> list[str]:
     """Returns the names of all tasks, the paper's eight first."""
 def episode_ids(split: str, task: str) -> list[str]:
     """Returns the episode ids of a task in a split: `train`, `test`, `standard`, `gen:A..B` or
-    `gen-standard:A..B`."""
+    `gen-standard:A..B`. A split of more than 10 million episodes raises `ValueError`."""
 def encode_png(rgb: NDArray[np.uint8]) -> bytes:
     """Encodes a color image, uint8 [height, width, 3], as PNG."""
 def weigh_reward(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -81,15 +82,21 @@ class EpisodeSource:
     def choose(
         self, rng: np.random.Generator, options: Mapping[str, Any] | None
     ) -> tuple[Episode, int]:
-        """Returns the episode and seed in the options of a reset; draws those that the options do not contain.
+        """Returns the episode and seed in the options of a reset; draws those that the options do not contain. The option
+        ``episode`` is an id or an ``Episode``.
 
         Other options have no effect, as PettingZoo's test of environments requires.
         """
         episode, seed = self.draw(rng)
         if options is not None and "episode" in options:
-            episode, seed = self.get(options["episode"]), 0
+            given = options["episode"]
+            episode, seed = given if isinstance(given, Episode) else self.get(given), 0
         if options is not None and "seed" in options:
-            seed = int(options["seed"])
+            given = options["seed"]
+            try:
+                seed = operator.index(given)
+            except TypeError:
+                raise ValueError(f"the option seed is {given!r}, expected an integer") from None
             if not 0 <= seed <= MAX_SEED:
                 raise ValueError(f"the option seed is {seed}, expected 0 to {MAX_SEED}")
         return episode, seed

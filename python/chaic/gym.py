@@ -136,7 +136,8 @@ class HelperEnv(gymnasium.Env[Any, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Obs, Info]:
-        """Starts an episode: one drawn from the split, or ``options["episode"]`` with ``options["seed"]``."""
+        """Starts an episode: one drawn from the split, or ``options["episode"]``, an id or an ``Episode``, with
+        ``options["seed"]``."""
         super().reset(seed=seed)
         episode, world_seed = self.source.choose(self.np_random, options)
         if self.world is None:

@@ -29,10 +29,11 @@ def camera(
 
     Raises ``ValueError`` if the viewing direction is undefined or vertical.
     """
-    at = np.asarray(eye, np.float64)
-    forward = np.asarray(look_at, np.float64) - at
+    at, target = np.asarray(eye, np.float64), np.asarray(look_at, np.float64)
+    is_point = at.shape == target.shape == (3,)
+    forward = target - at if is_point else np.zeros(3)
     right = np.cross(forward, [0.0, 1.0, 0.0])
-    if at.shape != (3,) or not np.linalg.norm(right) > 1e-6:
+    if not np.linalg.norm(right) > 1e-6:
         raise ValueError(
             f"a camera at {eye} cannot look at {look_at}: give two points that differ in x or z"
         )

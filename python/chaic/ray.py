@@ -75,7 +75,8 @@ def _play_missing(ray: Any, start: Callable[[int], Any], folders: Mapping[int, P
                 else:
                     _unpack(data, folders[k])
                     del remaining_tries[k]
-    except Exception:
+    except BaseException:
+        # Also after Ctrl-C: the tasks would otherwise occupy the cluster.
         for other in pending:
             ray.cancel(other, force=True)
         raise

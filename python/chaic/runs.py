@@ -10,6 +10,7 @@ import re
 import subprocess
 import sys
 import tempfile
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -356,7 +357,11 @@ class Run:
         return Page(path)
 
     def _repr_html_(self) -> str:
-        return f"<pre>{html.escape(self.report())}</pre>"
+        try:
+            text = self.report()
+        except RuntimeError as error:  # For example a run without finished episodes.
+            text = f"{self!r}: {error}"
+        return f"<pre>{html.escape(text)}</pre>"
 
     def __repr__(self) -> str:
         return f"Run({str(self.path)!r})"
@@ -375,9 +380,15 @@ def _page_path(out: str | os.PathLike[str] | None) -> Path:
 
 
 def _command(*arguments: str) -> str:
-    """Runs the command and returns its output. Raises ``RuntimeError`` with its error message if it fails."""
-    call = [sys.executable, "-m", "chaic", *arguments]
+    """Runs the command and returns its output; its warnings become a ``UserWarning``.
+
+    Raises ``RuntimeError`` with all that it prints if it fails: warnings and errors, then results, such as differences.
+    """
+    call = [sys.executable, "-m", "chaic", "--quiet", *arguments]
     done = subprocess.run(call, capture_output=True, encoding="utf-8", check=False)
+    problems = done.stderr.strip()
     if done.returncode != 0:
-        raise RuntimeError(done.stderr.strip() or done.stdout.strip())
+        raise RuntimeError("\n".join(filter(None, [problems, done.stdout.strip()])))
+    if problems:
+        warnings.warn(problems, stacklevel=3)
     return done.stdout

@@ -153,8 +153,8 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
         seeds: list[int | None]
         if seed is None:
             seeds = [None] * self.num_envs
-        elif isinstance(seed, int):
-            seeds = [seed + k for k in range(self.num_envs)]
+        elif isinstance(seed, (int, np.integer)):
+            seeds = [int(seed) + k for k in range(self.num_envs)]
         else:
             seeds = list(seed)
         if len(seeds) != self.num_envs:

@@ -68,7 +68,7 @@ def test_invalid_arguments_are_refused():
     for invalid in ([0, 0], [99, 0, 0], [0, 0, 32], [0.5, 0, 0], None, np.full(3, np.nan)):
         with pytest.raises(ValueError):
             env.step(invalid)
-    for seed in (-1, 2**32):
+    for seed in (-1, 2**32, 1.5, "a"):
         with pytest.raises(ValueError, match="option seed"):
             env.reset(options={"seed": seed})
     with pytest.raises(ValueError):
@@ -207,6 +207,8 @@ def test_invalid_vector_arguments_are_refused():
         make(0)
     with pytest.raises(ValueError, match="unknown render mode"):
         HelperVectorEnv("obstacle", render_mode="human")
+    first, again = (make(2, observation="proprioception").reset(seed=seed)[1] for seed in (3, np.int64(3)))
+    assert first["episode_id"].tolist() == again["episode_id"].tolist()
     with pytest.raises(ValueError, match='add "rgb"'):
         HelperVectorEnv("obstacle", observation="proprioception", render_mode="rgb_array")
 
@@ -290,4 +292,19 @@ def test_actions_refer_to_pixels_without_images_as_well():
             kind = [0, 0, 1, 2, pick_up, pick_up][rng.integers(6)]
             env.step(np.array([kind, *rng.integers(32, size=2)]))
         digests.append(env.unwrapped.world.digest())
+    assert digests[0] == digests[1]
+
+
+def test_a_reset_takes_an_edited_episode():
+    fields = chaic.Episode("low_target/train/03").as_dict()
+    del fields["generator"]
+    fields["setup"]["horizon"] = 120
+    env = HelperEnv("low_target", image_size=32)
+    digests = []
+    for _ in range(2):
+        env.reset(options={"episode": chaic.Episode.from_dict(fields), "seed": 7})
+        assert env.world.horizon == 120
+        digests.append(env.world.digest())
+        env.reset(options={"episode": "low_target/train/03"})
+        assert env.world.horizon > 120
     assert digests[0] == digests[1]

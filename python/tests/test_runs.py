@@ -2,6 +2,7 @@
 
 import html
 import json
+import re
 import sys
 import time
 from functools import partial
@@ -215,6 +216,22 @@ def test_shards_stay_after_a_failure_and_go_after_the_merge(tmp_path, monkeypatc
     assert not (tmp_path / "other.shards").exists(), "no shard was played"
 
 
+def test_ctrl_c_cancels_the_tasks_of_a_cluster(tmp_path, monkeypatch):
+    cancelled = []
+
+    class Interrupted(LocalRay):
+        def wait(self, references, num_returns):
+            raise KeyboardInterrupt
+
+        def cancel(self, reference, force):
+            cancelled.append(reference)
+
+    monkeypatch.setitem(sys.modules, "ray", Interrupted())
+    with pytest.raises(KeyboardInterrupt):
+        chaic.ray.evaluate(out=tmp_path / "run", baselines="none", shards=2)
+    assert len(cancelled) == 2 and not (tmp_path / "run.shards").exists()
+
+
 def test_an_interrupted_run_can_be_resumed(tmp_path):
     class Interrupts(Turner):
         def act(self, observation):
@@ -265,6 +282,8 @@ def test_invalid_arguments_are_refused(tmp_path):
         (ValueError, lambda: chaic.evaluate(Turner, out=out, set="nothing=1", **OPTIONS)),
         (ValueError, lambda: chaic.evaluate(Turner, out=out, episodes=tmp_path, **OPTIONS)),
         (ValueError, lambda: chaic.evaluate(Turner, out=out, **{**OPTIONS, "jobs": 0})),
+        (ValueError, lambda: chaic.evaluate(Turner, out=out, **{**OPTIONS, "n_episodes": -1})),
+        (ValueError, lambda: chaic.evaluate(Turner, out=out, seeds=-1, **OPTIONS)),
         (ValueError, lambda: chaic.evaluate(Turner, out=out, baselines=["rpp"], **OPTIONS)),
         (TypeError, lambda: chaic.evaluate(Turner, out=out, colour="red", **OPTIONS)),
         (FileNotFoundError, lambda: chaic.Run(tmp_path / "nothing")),
@@ -321,6 +340,20 @@ def test_results_are_read_line_by_line(tmp_path):
     assert sorted(run.records()["task"]) == sorted([result["task"], "shopping"])
 
 
+def test_warnings_of_commands_hide_no_differences(tmp_path, episode):
+    folder = write_short_episode(episode, tmp_path / "episodes", horizon=60)
+    run = chaic.evaluate(baselines="none", episodes=folder, out=tmp_path / "run", quiet=True)
+    with (run.path / "results.jsonl").open("a") as results:
+        results.write('{"helper"')
+    with pytest.warns(UserWarning, match="is cut off"):
+        assert "TR" in run.report()
+    (trace,) = (run.path / "traces").rglob("*.jsonl")
+    trace.write_text(re.sub(r'"digest":"[0-9a-f]{16}"', f'"digest":"{"0" * 16}"', trace.read_text()))
+    with pytest.raises(RuntimeError) as raised:
+        run.verify()
+    assert "is cut off" in str(raised.value) and "DIFFERS" in str(raised.value)
+
+
 def test_old_option_names_warn(tmp_path):
     old = {name: value for name, value in OPTIONS.items() if name != "n_episodes"}
     with pytest.warns(DeprecationWarning, match="n_episodes"):
@@ -331,3 +364,13 @@ def test_old_option_names_warn(tmp_path):
     assert run.options["helpers"] == ["none"]
     with pytest.raises(TypeError, match="n_episodes"):
         chaic.evaluate(Turner, first=1, out=tmp_path / "other", **OPTIONS)
+
+
+def test_a_notebook_shows_why_a_run_has_no_report(tmp_path, monkeypatch):
+    def fail(*_):
+        raise RuntimeError("no finished <episode>")
+
+    (tmp_path / "run.json").write_text("{}")
+    monkeypatch.setattr("chaic.runs._command", fail)
+    text = chaic.Run(tmp_path)._repr_html_()
+    assert "no finished &lt;episode&gt;" in text and "<episode>" not in text

@@ -1,7 +1,9 @@
 """Worlds, episodes, planners and built-in helpers in Python."""
 
 import json
+import os
 import pickle
+import signal
 import threading
 from pathlib import Path
 
@@ -121,8 +123,9 @@ def test_an_episode_is_rendered_from_a_given_camera(episode):
     ids = chaic.render(episode, camera=camera, images=["ids"])["ids"]
     assert ids[32, 32] in np.unique(world.render(camera=camera, images=["ids"])["ids"])
     assert chaic.render(world, camera=camera)["rgb"].shape == (65, 65, 3)
-    with pytest.raises(ValueError, match="differ in x or z"):
-        chaic.camera([0, 2, 0], [0, 0, 0])
+    for eye, look_at in [([0, 2, 0], [0, 0, 0]), ([0, 2, 0], [1]), ([0, 2], [1, 2])]:
+        with pytest.raises(ValueError, match="differ in x or z"):
+            chaic.camera(eye, look_at)
     for fov_deg in (0, 180, float("nan")):
         with pytest.raises(ValueError, match="no view"):
             world.render(camera=chaic.camera([0, 2, 0], [1, 2, 0], vertical_fov_deg=fov_deg))
@@ -213,6 +216,18 @@ def test_a_world_in_use_by_another_thread_raises(episode):
     for error in errors:
         assert "borrowed" in str(error) or "needs no action now" in str(error)
     assert world.frame > 0
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no signals of this kind")
+def test_ctrl_c_stops_a_long_call_and_the_next_call_continues(episode):
+    stopped, whole = (chaic.World(episode, helper="rhp") for _ in range(2))
+    threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        stopped.advance()
+    assert 0 < stopped.frame < stopped.horizon
+    until = stopped.frame + 30
+    assert stopped.advance(until) == whole.advance(until) == "stopped"
+    assert stopped.digest() == whole.digest()
 
 
 def test_a_built_in_helper_acts_alike_inside_and_outside_the_world(episode):
@@ -377,6 +392,34 @@ def test_numbers_out_of_range_raise_value_errors(episode, tmp_path):
         chaic.Batch([episode], [-1])
     with pytest.raises(ValueError, match="agent is -1"):
         chaic.World(episode).briefing(-1)
+    world, batch, planner = waiting(episode), chaic.Batch([episode], [0], **OPTIONS), chaic.Planner()
+    for name, call in [
+        ("until", lambda: world.advance(-1)),
+        ("width", lambda: world.floor_plan(-1)),
+        ("width", lambda: episode.floor_plan(-1)),
+        ("image_size", lambda: world.render(image_size=-1)),
+        ("height", lambda: world.render(camera=world.observe().camera | {"height": -1})),
+        ("image_size", lambda: chaic.World(episode, image_size=-1)),
+        ("partner_image_size", lambda: chaic.World(episode, partner_image_size=-1)),
+        ("world", lambda: batch.score(-1)),
+        ("world", lambda: batch.digest(-1)),
+        ("world", lambda: batch.briefing(-1)),
+        ("image_size", lambda: chaic.Planner(image_size=-1)),
+        ("side", lambda: planner.semantic_map(-1)),
+        ("index", lambda: planner.choose(-1)),
+    ]:
+        with pytest.raises(ValueError, match=f"^{name} is -1, expected"):
+            call()
+    with pytest.raises(ValueError, match=r"worlds is \[-1\]"):
+        batch.reset([-1], [episode], [0])
+    with pytest.raises(ValueError, match="a number in it is negative or too large"):
+        world.submit({"wait": {"frames": -1}})
+    with pytest.raises(ValueError, match="n_episodes is -1"):
+        chaic.evaluate(baselines="none", out=tmp_path / "run", n_episodes=-1, quiet=True)
+    with pytest.raises(ValueError, match="no pixels"):
+        chaic.encode_png(np.zeros((0, 4, 3), np.uint8))
+    with pytest.raises(ValueError, match="expected at most 10000000"):
+        chaic.episode_ids("gen:0..1000000000", "obstacle")
     with pytest.raises(ValueError, match="jobs is -1"):
         chaic.evaluate(baselines="none", out=tmp_path / "run", jobs=-1, quiet=True)
 

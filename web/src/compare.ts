@@ -6,7 +6,7 @@ import { badge } from "./badge.js";
 import { PlaybackClock } from "./clock.js";
 import { controls } from "./controls.js";
 import { doneAt, firstDifference, progressPath } from "./difference.js";
-import { clock } from "./frames.js";
+import { clock, delivered } from "./frames.js";
 import type { DecisionLine, FrameState, ReplayInfo } from "./messages.js";
 import { drawnSize, MAX_PX, paint, paintMap } from "./pictures.js";
 import { ReplayPlayer, type DrawnFrame, type Source } from "./player.js";
@@ -151,9 +151,9 @@ export class ChaicCompare extends LitElement {
 
   private heading(runs: [ReplayInfo, ReplayInfo]): TemplateResult {
     const [a, b] = runs;
-    const delivered = (info: ReplayInfo): TemplateResult =>
+    const result = (info: ReplayInfo): TemplateResult =>
       html`<p>
-        <b>${label(info)}</b>: ${doneAt(info.timeline.deliveries, info.last_frame)} of ${info.total} delivered.
+        <b>${label(info)}</b>: ${delivered(doneAt(info.timeline.deliveries, info.last_frame), info.total, info.unit)}.
         ${badge(info)}
         ${info.problem
           ? html`<span class="problem" role="alert">
@@ -163,7 +163,7 @@ export class ChaicCompare extends LitElement {
       </p>`;
     return html`<header>
       <h2>${a.task}: ${label(a)} and ${label(b)}</h2>
-      ${runs.map(delivered)} ${this.difference(runs)}
+      ${runs.map(result)} ${this.difference(runs)}
       <p class="small">${a.episode}, seed ${a.seed}, chaic ${a.chaic}</p>
     </header>`;
   }
@@ -224,7 +224,7 @@ export class ChaicCompare extends LitElement {
 
   private status(runs: [ReplayInfo, ReplayInfo]): string {
     const done = runs.map((info) => doneAt(info.timeline.deliveries, this.frame));
-    return `${done[0]} and ${done[1]} of ${runs[0].total} delivered`;
+    return delivered(done.join(" and "), runs[0].total, runs[0].unit);
   }
 
   private story(info: ReplayInfo): TemplateResult {

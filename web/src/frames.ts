@@ -6,6 +6,11 @@ export function clock(frame: number, framesPerSecond: number): string {
   return `${Math.floor(seconds / 60)}:${String(seconds % 60).padStart(2, "0")}`;
 }
 
+/** Says which part of the value of the goal is delivered. */
+export function delivered(done: number | string, total: number, unit: string): string {
+  return `${done} of ${total}${unit && ` ${unit}`} delivered`;
+}
+
 /** Returns the nearest of these frames before or after a frame; undefined if there is none. */
 export function nearest(frames: number[], from: number, direction: 1 | -1): number | undefined {
   const candidates = frames.filter((frame) => Math.sign(frame - from) === direction);

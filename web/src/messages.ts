@@ -60,6 +60,8 @@ export interface ReplayInfo {
   length: number;
   frames_per_second: number;
   total: number;
+  /** Unit of the value of the goal; empty for a number of objects. */
+  unit: string;
   n_verified: number;
   n_decisions: number;
   problem: string | null;
@@ -213,6 +215,8 @@ export interface LiveInfo {
   episode: string;
   /** Empty for a person who must find out. */
   goal: string[];
+  /** Unit of the value of the goal; empty for a number of objects. */
+  unit: string;
   /** Kind of person of the person's body. */
   person: string;
   reach_m: [number, number];

@@ -3,7 +3,7 @@
 import { html, LitElement, nothing, type PropertyValues, type TemplateResult } from "lit";
 import { property, query, state } from "lit/decorators.js";
 import { repeat } from "lit/directives/repeat.js";
-import { clock } from "./frames.js";
+import { clock, delivered } from "./frames.js";
 import type {
   Action,
   Branch,
@@ -144,7 +144,8 @@ export class ChaicPlay extends LitElement {
         break;
       case "trace":
         this.nTraceRequests -= 1;
-        if (this.game?.isStudy) this.record(response.trace);
+        // A study takes no records of an episode that has failed.
+        if (this.game?.isStudy && !this.problem) this.record(response.trace);
         if (this.isOver && this.nTraceRequests === 0) this.finish(response.trace);
         break;
       case "reference":
@@ -359,10 +360,10 @@ export class ChaicPlay extends LitElement {
   private status(shown: LiveState): TemplateResult {
     const { action, plan } = shown.caption;
     const hands = shown.hands.map((held) => held ?? "nothing");
-    const delivered = shown.progress ? `, ${shown.progress[0]} of ${shown.progress[1]} delivered` : "";
+    const progress = shown.progress ? `, ${delivered(...shown.progress, this.info?.unit ?? "")}` : "";
     const refused = shown.is_refused ? "Your last choice was no longer possible. Choose again." : "";
     return html`<p class="time">
-        ${this.time(shown.frame)} of ${this.time(shown.horizon)}${delivered}
+        ${this.time(shown.frame)} of ${this.time(shown.horizon)}${progress}
       </p>
       <p>Left hand: ${hands[0]}; right hand: ${hands[1]}</p>
       <p role="status">You: ${action}${plan ? ` (${plan})` : ""}${shown.failure ? `; failed: ${shown.failure}` : ""}</p>

@@ -4,7 +4,7 @@ import { html, LitElement, nothing, type PropertyValues, type TemplateResult } f
 import { property, query, queryAll, state } from "lit/decorators.js";
 import { PlaybackClock } from "./clock.js";
 import { controls } from "./controls.js";
-import { clock, lastBefore } from "./frames.js";
+import { clock, delivered, lastBefore } from "./frames.js";
 import { badge } from "./badge.js";
 import { language } from "./language.js";
 import { MapLayers } from "./layers.js";
@@ -160,7 +160,7 @@ export class ChaicReplay extends LitElement {
     return html`<header>
       <h2>${info.task}: the partner (${partner?.person ?? ""}) wants ${info.goal.join(", ")}</h2>
       <p>
-        ${helper}${info.is_complete ? `; ${done} of ${info.total} delivered` : ""}. ${limits(info)} ${branch(info)}
+        ${helper}${info.is_complete ? `; ${delivered(done, info.total, info.unit)}` : ""}. ${limits(info)} ${branch(info)}
         ${info.is_complete ? badge(info) : nothing}
       </p>
       ${this.problem
@@ -239,7 +239,7 @@ export class ChaicReplay extends LitElement {
   }
 
   private status(info: ReplayInfo): string {
-    return `${this.shown?.done ?? 0} of ${info.total} delivered`;
+    return delivered(this.shown?.done ?? 0, info.total, info.unit);
   }
 
   private story(info: ReplayInfo): TemplateResult {

@@ -170,6 +170,7 @@ export class ChaicStudy extends LitElement {
     const trial = openTrial(log.records);
     if (trial !== undefined && !this.isSimulatedByServer()) await this.store({ type: "trial_end", trial, outcome: "left" });
     this.at = checkpoint(this.steps, log.records);
+    await this.completeAtEnd();
   }
 
   /** Runs a change of the state once: a second click before its end has no effect. */
@@ -239,10 +240,15 @@ export class ChaicStudy extends LitElement {
     this.playing = "before";
     this.game = undefined;
     this.isResumed = false;
+    await this.completeAtEnd();
+    this.focusHeading();
+  }
+
+  /** Stores once that the participant has reached the debriefing, also by a reload after the last episode. */
+  private async completeAtEnd(): Promise<void> {
     const isLast = this.steps[this.at]?.kind === "debrief";
     const isComplete = this.log?.records.some((known) => known.type === "complete");
     if (isLast && !isComplete) await this.store({ type: "complete" });
-    this.focusHeading();
   }
 
   /** Deletes all data and ends the participation. */
@@ -413,9 +419,11 @@ export class ChaicStudy extends LitElement {
   }
 
   private bar(): TemplateResult {
+    // Without the copy in this browser, the page cannot delete the data on the server.
+    const isLeaveDisabled = this.hasLeft || this.waits === "removed";
     return html`<div class="bar" role="group" aria-label="Study">
       ${this.scanner.controls("One switch: offers one choice after the other")}
-      <button type="button" id="leave" ?disabled=${this.hasLeft} @click=${() => this.dialog?.showModal()}>
+      <button type="button" id="leave" ?disabled=${isLeaveDisabled} @click=${() => this.dialog?.showModal()}>
         Stop and delete
       </button>
     </div>`;

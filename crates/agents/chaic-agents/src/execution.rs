@@ -123,6 +123,7 @@ impl Executor {
         self.navigator.reset();
         self.recovery.reset();
         self.follower = Follower::default();
+        self.frontier_explorer.reset();
         self.random_explorer.reset();
         self.interaction = None;
         let kept_frames = rules.failures.failed_position_frames;
@@ -155,13 +156,14 @@ impl Executor {
         // Joint carriers avoid getting stuck by planning for both bodies.
         let is_pair = s.memory.other_end.is_some();
         if !is_standing && !is_pair && self.navigator.needs_recovery() {
-            if let Some(action) = self.recovery.step(s.memory, s.memory.last, &mut self.rng) {
-                return Progress::Act(action);
-            }
+            let action = self.recovery.step(s.memory, s.memory.last, &mut self.rng);
             if self.recovery.should_give_up() {
                 self.recovery = Recovery::default();
                 self.give_up(plan, s);
                 return Progress::Failed;
+            }
+            if let Some(action) = action {
+                return Progress::Act(action);
             }
         }
         match *plan {
@@ -236,8 +238,10 @@ impl Executor {
             }
             Plan::Deliver => {
                 if let Some(place) = self.place {
-                    let until = s.memory.frame + s.memory.rules.failed_goal_place_frames;
-                    s.memory.objects.ignore(place, until);
+                    let rules = &s.memory.rules;
+                    let frames =
+                        rules.failed_goal_place_frames.max(rules.failures.unreachable_frames);
+                    s.memory.objects.ignore(place, s.memory.frame + frames);
                 }
             }
             _ => {}

@@ -21,7 +21,7 @@ pub enum Walking {
     Careful,
     /// The original's: 4-connected paths over soft costs with no impassable cells. Arrival is by
     /// straight-line distance, and the goal is the object's position when the plan began. There is
-    /// no stuck recovery, but obstacles keep the person in the wheelchair turning on the spot
+    /// no stuck recovery, but obstacles keep the person in the wheelchair turning in place
     /// (facts A1.5, A1.6, A2.1).
     Lattice,
 }
@@ -125,7 +125,8 @@ pub struct PlannerRules {
     /// limits.
     pub any_failure_counts: bool,
     /// Time for which a goal place is ignored after a failed put-on or a delivery that timed out,
-    /// frames. The plan ends, even if the other hand holds something (facts A1.9, A2.1).
+    /// frames. The plan ends, even if the other hand holds something (facts A1.9, A2.1). If it is 0,
+    /// other goal places are preferred for [`FailureRules::unreachable_frames`] after a timeout.
     #[serde(alias = "goal_blackout_frames")]
     pub failed_goal_place_frames: Frame,
     /// Time for which an object is avoided after another agent was observed to hold it, frames.

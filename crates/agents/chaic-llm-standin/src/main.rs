@@ -23,7 +23,8 @@ struct Arguments {
     #[arg(long, default_value_t = 0)]
     latency_ms: u64,
     /// Fault kind and its rate, for example 429=0.3; can be repeated. All rates together are at
-    /// most 1.
+    /// most 1. Kinds: refused, reset, timeout, slow-drip, 429-with-wait, 429, 500, 503, empty,
+    /// truncated, wrong-schema, plan-not-listed, huge, invalid-utf8.
     #[arg(long, value_name = "KIND=RATE", value_parser = fault)]
     fault: Vec<(FaultKind, f64)>,
     /// Delay of timeout and slow-drip faults, milliseconds.
@@ -75,6 +76,23 @@ fn main() -> ExitCode {
         Err(error) => {
             eprintln!("error: can't listen on port {port}: {error}; choose another with --port");
             ExitCode::FAILURE
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory as _;
+
+    use super::*;
+
+    #[test]
+    fn the_help_lists_all_kinds_of_faults() {
+        let help = Arguments::command().render_long_help().to_string();
+        let words: Vec<&str> =
+            help.split(|c: char| c.is_whitespace() || ",.".contains(c)).collect();
+        for kind in FaultKind::ALL {
+            assert!(words.contains(&kind.name()), "{}: {help}", kind.name());
         }
     }
 }

@@ -109,22 +109,33 @@ fn parse_lenient(answer: &str, plans: &[String]) -> Option<usize> {
         .or_else(|| mentioned_plan(&lower, plans))
 }
 
-/// Parses the last JSON object within the text that names a plan.
+/// Parses the last JSON object within the text that names a plan. Objects within such an object, for
+/// example a list of alternatives, do not count.
 fn json_within(answer: &str) -> Option<usize> {
     /// Maximum number of opening braces that are tried.
     const MAX_BRACES: usize = 200;
-    let braces = answer.char_indices().rev().filter(|(_, c)| *c == '{').take(MAX_BRACES);
-    braces.map(|(at, _)| &answer[at..]).find_map(object_number)
+    let mut braces: Vec<usize> =
+        answer.rmatch_indices('{').take(MAX_BRACES).map(|(at, _)| at).collect();
+    braces.reverse();
+    let (mut found, mut end) = (None, 0);
+    for at in braces {
+        if at >= end
+            && let Some((number, length)) = object_number(&answer[at..])
+        {
+            (found, end) = (Some(number), at + length);
+        }
+    }
+    found
 }
 
 /// Parses the JSON object within the text; `None` if there are several, or one within another.
 fn only_object(answer: &str) -> Option<usize> {
     let at = answer.find('{').filter(|at| answer.rfind('{') == Some(*at))?;
-    object_number(&answer[at..])
+    object_number(&answer[at..]).map(|(number, _)| number)
 }
 
-/// Parses a complete JSON object at the start of the text.
-fn object_number(text: &str) -> Option<usize> {
+/// Parses a complete JSON object at the start of the text; returns its number and its length, bytes.
+fn object_number(text: &str) -> Option<(usize, usize)> {
     #[derive(Deserialize)]
     #[serde(untagged)]
     enum Number {
@@ -136,11 +147,13 @@ fn object_number(text: &str) -> Option<usize> {
         #[serde(alias = "Plan", alias = "choice", alias = "number", alias = "answer")]
         plan: Number,
     }
-    let loose: Loose = serde_json::Deserializer::from_str(text).into_iter().next()?.ok()?;
-    match loose.plan {
-        Number::Whole(number) => Some(number),
-        Number::Text(text) => leading_number(&text),
-    }
+    let mut values = serde_json::Deserializer::from_str(text).into_iter();
+    let loose: Loose = values.next()?.ok()?;
+    let number = match loose.plan {
+        Number::Whole(number) => number,
+        Number::Text(text) => leading_number(&text)?,
+    };
+    Some((number, values.byte_offset()))
 }
 
 /// Parses the last `plan: 3`, `plan = 3`, `"plan": 3` or `answer: 3`.
@@ -252,6 +265,8 @@ mod tests {
             ("Plan: 2", true, 2, true),
             ("```json\n{\"reasoning\": \"x\", \"plan\": \"4\"}\n```", true, 4, true),
             ("Sure! {\"plan\": 1} I mean {\"plan\": 2}.", true, 2, true),
+            ("So: {\"plan\": 4, \"others\": [{\"plan\": 1}, {\"plan\": 2}]}", false, 4, true),
+            ("So: {\"decision\": {\"plan\": 3}}", false, 3, true),
             ("First plan 1, no: **Plan: 4**", false, 4, true),
             ("4", false, 4, true),
             ("(4).", false, 4, true),

@@ -171,8 +171,10 @@ impl Client {
         // The description of a key error may repeat part of the key.
         let is_about_key = matches!(status, 401 | 403);
         let text = if is_about_key { String::new() } else { self.masked_summary(text) };
-        let about_schema =
-            ["response_format", "json_schema", "schema"].iter().any(|w| text.contains(w));
+        let lower = text.to_lowercase();
+        let about_schema = ["response_format", "response format", "schema", "structured output"]
+            .iter()
+            .any(|w| lower.contains(w));
         let refuses_schema =
             matches!(status, 400 | 422) && request.n_schema_plans.is_some() && about_schema;
         let colon = if text.is_empty() { "" } else { ": " };
@@ -220,9 +222,10 @@ impl Client {
                 format!("the answer is not a chat completion: {problem}"),
             )
         };
+        let reported = reported_error(&value);
         // The error quotes the unexpected value.
         let completion: Completion = serde_json::from_value(value)
-            .map_err(|e| wrong(&self.masked_summary(&e.to_string())))?;
+            .map_err(|e| wrong(&self.masked_summary(&reported.unwrap_or_else(|| e.to_string()))))?;
         let choice = completion.choices.into_iter().next().ok_or_else(|| wrong("no choice"))?;
         let text =
             message_text(&choice.message.content).or(choice.message.refusal).unwrap_or_default();
@@ -263,6 +266,15 @@ struct CompletionMessage {
     content: Value,
     #[serde(default)]
     refusal: Option<String>,
+}
+
+/// Returns the error in a body with a status of success, as some gateways send it. The description of a key
+/// error may repeat part of the key.
+fn reported_error(body: &Value) -> Option<String> {
+    let error = &body["error"];
+    let text = error["message"].as_str().or_else(|| error.as_str())?;
+    let text = if text.to_lowercase().contains("key") { "a key error" } else { text };
+    Some(format!("the endpoint reports {text}"))
 }
 
 /// Returns the text of a message, given as a string or in parts.
@@ -337,14 +349,57 @@ mod tests {
         assert_eq!(usage_of(&json!({ "prompt_tokens": "many" })), None);
     }
 
+    fn client_and_request(key: &str, n_schema_plans: Option<usize>) -> (Client, ChatRequest) {
+        let settings = settings("http://h/v1", EndpointKind::Openai);
+        let (model, messages) = ("m".to_owned(), Vec::new());
+        let purpose = crate::exchange::Purpose::Decide;
+        let request = ChatRequest { model, purpose, messages, n_schema_plans };
+        (Client::with_key(&settings, Key::new(key)), request)
+    }
+
+    #[test]
+    fn refusals_of_a_schema_are_recognized() {
+        let kind = |n_schema_plans, status, text: &str| {
+            let (client, request) = client_and_request("", n_schema_plans);
+            client.refusal(status, text, None, &request).fault.kind
+        };
+        for text in [
+            "response_format of type json_schema is not supported",
+            "JSON Schema is not supported by this model",
+            "This model does not support response format `json`",
+            "Structured Outputs are unavailable",
+        ] {
+            assert_eq!(kind(Some(2), 400, text), FaultKind::Schema, "{text}");
+            assert_eq!(kind(None, 400, text), FaultKind::Status, "no schema was sent");
+            assert_eq!(kind(Some(2), 500, text), FaultKind::Status, "{text}");
+        }
+        assert_eq!(kind(Some(2), 400, "temperature is too high"), FaultKind::Status);
+    }
+
+    #[test]
+    fn an_error_with_a_status_of_success_is_described() {
+        let (client, request) = client_and_request("", None);
+        let detail = |body: Value| {
+            let bytes = body.to_string().into_bytes();
+            client.parse_reply(&request, bytes, Duration::ZERO).unwrap_err().fault.detail
+        };
+        for body in [
+            json!({ "error": { "message": "no capacity", "code": 502 } }),
+            json!({ "error": "no capacity" }),
+        ] {
+            let detail = detail(body);
+            assert!(detail.ends_with("the endpoint reports no capacity"), "{detail}");
+        }
+        // Endpoints quote the start of a wrong key.
+        let wrong_key = json!({ "error": { "message": "Incorrect API key: sk-ses***89" } });
+        assert!(detail(wrong_key).ends_with("the endpoint reports a key error"));
+        assert!(detail(json!({})).contains("missing field"));
+    }
+
     #[test]
     fn descriptions_of_failures_contain_no_part_of_the_key() {
         const KEY: &str = "sk-sesame-0123456789";
-        let client =
-            Client::with_key(&settings("http://h/v1", EndpointKind::Openai), Key::new(KEY));
-        let (model, messages) = ("m".to_owned(), Vec::new());
-        let purpose = crate::exchange::Purpose::Decide;
-        let request = ChatRequest { model, purpose, messages, n_schema_plans: None };
+        let (client, request) = client_and_request(KEY, None);
         for body in [
             json!({ "choices": format!("the key is {KEY}") }),
             json!({ "choices": [{ "message": KEY }] }),

@@ -89,6 +89,12 @@ pub struct Body {
     pub reach: Option<[String; 2]>,
     /// Maximum lifted mass, kilograms.
     pub strength_kg: u32,
+    /// Number of usable hands.
+    pub n_hands: usize,
+    /// True if the person can carry containers.
+    pub carries_containers: bool,
+    /// True if the person can lift furniture.
+    pub lifts_furniture: bool,
     /// True if the person walks a bicycle.
     pub walks_bicycle: bool,
     /// True if the person uses a wheelchair.

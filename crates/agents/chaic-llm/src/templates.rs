@@ -257,6 +257,28 @@ mod tests {
     }
 
     #[test]
+    fn a_partner_is_told_the_limits_of_its_hands() {
+        let templates = Templates::load(None).unwrap();
+        let render = |facts: &PromptContext| templates.prompt(facts, Question::Text).unwrap();
+        let mut samples = PromptContext::samples().into_iter();
+        let mut facts = samples.find(|f| f.track == PromptTrack::Partner).unwrap();
+        let prompt = render(&facts);
+        assert!(prompt.contains("\n- You have two hands. Each holds one object.\n- A container ("));
+        facts.me.n_hands = 1;
+        (facts.me.carries_containers, facts.me.lifts_furniture) = (false, false);
+        let prompt = render(&facts);
+        assert!(
+            prompt.contains("\n- You have one usable hand. It holds one object.\n"),
+            "{prompt}"
+        );
+        assert!(!prompt.contains("two hands") && !prompt.contains("- A container ("), "{prompt}");
+        facts.is_moving_house = true;
+        let prompt = render(&facts);
+        assert!(prompt.contains("\n- You can't lift furniture.\n"), "{prompt}");
+        assert!(!prompt.contains("lift it together"), "{prompt}");
+    }
+
+    #[test]
     fn a_user_template_replaces_a_built_in_one() {
         let dir = tempfile::tempdir().unwrap();
         fs::write(dir.path().join("ask_text.txt"), "Say a number, {{ track }}.").unwrap();

@@ -32,12 +32,13 @@ impl<F: std::os::fd::AsFd> Pipe<F> {
         /// Polling period of `is_over`: 50 ms.
         const POLL_PERIOD: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
         loop {
+            // Before each call: the other end may always be ready.
+            if self.is_over.load(Ordering::Relaxed) {
+                return Err(io::ErrorKind::BrokenPipe.into());
+            }
             match call(&mut self.file) {
                 Err(e) if e.kind() == io::ErrorKind::WouldBlock => {}
                 done => return done,
-            }
-            if self.is_over.load(Ordering::Relaxed) {
-                return Err(io::ErrorKind::BrokenPipe.into());
             }
             match poll(&mut [PollFd::new(&self.file, ready)], Some(&POLL_PERIOD)) {
                 Ok(_) | Err(rustix::io::Errno::INTR) => {}
@@ -98,5 +99,20 @@ impl<F: Write> Write for Pipe<F> {
 
     fn flush(&mut self) -> io::Result<()> {
         self.file.flush()
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_abandoned_pipe_ends_although_it_always_has_data() {
+        let is_over = Arc::new(AtomicBool::new(false));
+        let mut pipe = Pipe::new(std::fs::File::open("/dev/zero").unwrap(), &is_over).unwrap();
+        let mut buffer = [1; 8];
+        assert_eq!(pipe.read(&mut buffer).unwrap(), 8);
+        is_over.store(true, Ordering::Relaxed);
+        assert_eq!(pipe.read(&mut buffer).unwrap_err().kind(), io::ErrorKind::BrokenPipe);
     }
 }

@@ -60,36 +60,40 @@ impl HelperProcess {
         std::os::unix::process::CommandExt::process_group(&mut builder, 0);
         let failed =
             |e: std::io::Error| AgentError::Broken(format!("a process can't be started: {e}"));
-        let mut child = builder.spawn().map_err(failed)?;
-        let (stdin, stdout, stderr) =
-            (child.stdin.take(), child.stdout.take(), child.stderr.take());
-        let (Some(stdin), Some(stdout), Some(stderr)) = (stdin, stdout, stderr) else {
-            return Err(AgentError::Broken("the process has no pipes".to_owned()));
-        };
-        let is_over = Arc::new(AtomicBool::new(false));
-        let pipe_error =
-            |e: std::io::Error| AgentError::Broken(format!("a pipe can't be set up: {e}"));
-        let stdin = Pipe::new(stdin, &is_over).map_err(pipe_error)?;
-        let stdout = Pipe::new(stdout, &is_over).map_err(pipe_error)?;
-        let stderr_pipe = Pipe::new(stderr, &is_over).map_err(pipe_error)?;
-        let stderr = Arc::new(Mutex::new(Vec::new()));
-        let kept = Arc::clone(&stderr);
-        let (end, stderr_end) = channel();
-        std::thread::spawn(move || {
-            keep_stderr(stderr_pipe, &kept);
-            drop(end);
-        });
-        Ok(HelperProcess {
-            child,
-            requests: Some(writer(stdin)),
-            responses: reader(stdout),
-            stderr,
-            stderr_end,
+        // Dropping it ends the process, also after an error.
+        let mut process = HelperProcess {
+            child: builder.spawn().map_err(failed)?,
+            requests: None,
+            responses: channel().1,
+            stderr: Arc::default(),
+            stderr_end: channel().1,
             command: Arc::clone(command),
-            is_over,
+            is_over: Arc::default(),
             waited: Duration::ZERO,
             stop,
-        })
+        };
+        process.connect().map_err(|e| {
+            AgentError::Broken(format!("the pipes of a process can't be set up: {e}"))
+        })?;
+        Ok(process)
+    }
+
+    /// Starts the threads that write to and read from its pipes.
+    fn connect(&mut self) -> std::io::Result<()> {
+        let missing = || std::io::Error::from(ErrorKind::BrokenPipe);
+        let stdin = Pipe::new(self.child.stdin.take().ok_or_else(missing)?, &self.is_over)?;
+        let stdout = Pipe::new(self.child.stdout.take().ok_or_else(missing)?, &self.is_over)?;
+        let stderr = Pipe::new(self.child.stderr.take().ok_or_else(missing)?, &self.is_over)?;
+        let kept = Arc::clone(&self.stderr);
+        let (end, stderr_end) = channel();
+        self.stderr_end = stderr_end;
+        spawn(move || {
+            keep_stderr(stderr, &kept);
+            drop(end);
+        })?;
+        self.responses = reader(stdout)?;
+        self.requests = Some(writer(stdin)?);
+        Ok(())
     }
 
     /// Sends a frame and waits for the answer.
@@ -268,24 +272,31 @@ fn script(command: &HelperProgram) -> String {
     format!("ulimit -d {kib} || exit 125\n{}", command.line)
 }
 
+/// Starts a thread, which may fail if the system has no more of them.
+fn spawn(work: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
+    std::thread::Builder::new().spawn(work).map(drop)
+}
+
 /// Starts a thread that writes frames, so that a process that does not read blocks no caller.
-fn writer(mut stdin: impl Write + Send + 'static) -> Sender<MessageFrame> {
+fn writer(mut stdin: impl Write + Send + 'static) -> std::io::Result<Sender<MessageFrame>> {
     let (sender, frames) = channel::<MessageFrame>();
-    std::thread::spawn(move || {
+    spawn(move || {
         for frame in frames {
             if frame.write(&mut stdin).is_err() {
                 return;
             }
         }
-    });
-    sender
+    })?;
+    Ok(sender)
 }
 
 /// Starts a thread that reads frames until the pipe is closed.
-fn reader(mut stdout: impl Read + Send + 'static) -> Receiver<Result<MessageFrame, String>> {
+fn reader(
+    mut stdout: impl Read + Send + 'static,
+) -> std::io::Result<Receiver<Result<MessageFrame, String>>> {
     // At most one answer is due at a time.
     let (sender, frames) = sync_channel(1);
-    std::thread::spawn(move || {
+    spawn(move || {
         loop {
             let read = match MessageFrame::read(&mut stdout, 0) {
                 Ok(Some(frame)) => Ok(frame),
@@ -298,8 +309,8 @@ fn reader(mut stdout: impl Read + Send + 'static) -> Receiver<Result<MessageFram
                 return;
             }
         }
-    });
-    frames
+    })?;
+    Ok(frames)
 }
 
 /// Reads standard error to its end and keeps the last [`STDERR_LEN`] bytes.

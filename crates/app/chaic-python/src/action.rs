@@ -2,10 +2,11 @@
 
 use chaic_core::observation::Proprioception;
 use chaic_core::{Action, Hand, Outcome, Target};
+use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
 use pythonize::{depythonize, pythonize};
 
-use crate::error::mistake;
+use crate::error::{mistake, short_repr};
 
 /// Kinds of actions; rows refer to them by index. Actions of a hand on an object take a pixel of the last image.
 pub const ACTIONS: [&str; 11] = [
@@ -62,7 +63,13 @@ pub fn from_row([kind, column, row]: [i64; 3]) -> PyResult<Action> {
 /// `ValueError` if it is not an action.
 pub fn from_object(object: &Bound<'_, PyAny>) -> PyResult<Action> {
     let action: Action = depythonize(object).map_err(|error| {
-        mistake(format!("{} is no action: {error}", crate::error::short_repr(object)))
+        let error = PyErr::from(error);
+        let problem = if error.is_instance_of::<PyOverflowError>(object.py()) {
+            "a number in it is negative or too large".to_owned()
+        } else {
+            error.value(object.py()).to_string()
+        };
+        mistake(format!("{} is no action: {problem}", short_repr(object)))
     })?;
     match action {
         Action::Wait { frames: 0 } => Err(mistake("a wait takes at least 1 frame")),

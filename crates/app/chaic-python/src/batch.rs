@@ -162,7 +162,7 @@ impl Batch {
     fn reset(
         &mut self,
         py: Python<'_>,
-        worlds: Vec<usize>,
+        #[pyo3(from_py_with = crate::error::world_indices)] worlds: Vec<usize>,
         episodes: Vec<Bound<'_, Episode>>,
         #[pyo3(from_py_with = crate::error::seeds)] seeds: Vec<u32>,
     ) -> PyResult<()> {
@@ -314,7 +314,11 @@ impl Batch {
     }
 
     /// Returns the score of a world so far, as `World.score`.
-    fn score<'py>(&mut self, py: Python<'py>, world: usize) -> PyResult<Bound<'py, PyAny>> {
+    fn score<'py>(
+        &mut self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = crate::error::world_index)] world: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
         let envs = self.envs()?;
         let n = envs.envs().len();
         score(py, envs.envs().get(world).ok_or_else(|| no_such("world", world, n))?)
@@ -324,7 +328,7 @@ impl Batch {
     #[pyo3(signature = (world, agent=1))]
     fn briefing(
         &mut self,
-        world: usize,
+        #[pyo3(from_py_with = crate::error::world_index)] world: usize,
         #[pyo3(from_py_with = crate::error::agent_number)] agent: u8,
     ) -> PyResult<Briefing> {
         let envs = self.envs()?;
@@ -343,7 +347,10 @@ impl Batch {
     }
 
     /// Returns the digest of the state of a world.
-    fn digest(&mut self, world: usize) -> PyResult<String> {
+    fn digest(
+        &mut self,
+        #[pyo3(from_py_with = crate::error::world_index)] world: usize,
+    ) -> PyResult<String> {
         let envs = self.envs()?;
         let n = envs.envs().len();
         let env = envs.envs().get(world).ok_or_else(|| no_such("world", world, n))?;

@@ -56,10 +56,11 @@ impl Episode {
 
     /// Draws the top view, uint8 [height, width, 3].
     #[pyo3(signature = (width=640))]
-    fn floor_plan<'py>(&self, py: Python<'py>, width: u32) -> PyResult<Bound<'py, PyArray3<u8>>> {
-        if !(64..=8192).contains(&width) {
-            return Err(mistake(format!("width is {width}, expected 64 to 8192")));
-        }
+    fn floor_plan<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = crate::error::plan_width)] width: u32,
+    ) -> PyResult<Bound<'py, PyArray3<u8>>> {
         let picture = py.detach(|| {
             let world = World::new(self.0.setup().clone(), RuleSet::PAPER.world)?;
             Ok::<_, SetupError>(floor_plan::draw(&world, width))
@@ -118,6 +119,9 @@ pub fn encode_png<'py>(
     let &[height, width, 3] = rgb.shape() else {
         return Err(mistake("expected a picture of shape (height, width, 3)"));
     };
+    if height == 0 || width == 0 {
+        return Err(mistake("the picture has no pixels"));
+    }
     let pixels: Vec<u8> = rgb.as_array().iter().copied().collect();
     let mut bytes = Cursor::new(Vec::new());
     let picture = RgbImage::from_raw(width as u32, height as u32, pixels)
@@ -126,13 +130,20 @@ pub fn encode_png<'py>(
     Ok(PyBytes::new(py, bytes.get_ref()))
 }
 
+/// Maximum number of listed episode ids, which take about 1 GB of memory.
+const MAX_IDS: usize = 10_000_000;
+
 /// Returns the episode ids of a task in a split: `train`, `test`, `standard`, `gen:A..B` or
-/// `gen-standard:A..B`.
+/// `gen-standard:A..B`. A split of more than 10 million episodes raises `ValueError`.
 #[pyfunction]
 pub fn episode_ids(split: &str, task: &str) -> PyResult<Vec<String>> {
     let split: Split = split.parse().map_err(mistake)?;
     let task: TaskId = task.parse().map_err(mistake)?;
-    Ok((0..split.len_of(task)).map(|k| split.episode_id(task, k)).collect())
+    let n = split.len_of(task);
+    if n > MAX_IDS {
+        return Err(mistake(format!("{split} has {n} episodes, expected at most {MAX_IDS}")));
+    }
+    Ok((0..n).map(|k| split.episode_id(task, k)).collect())
 }
 
 /// Returns the names of all tasks, the paper's eight first.

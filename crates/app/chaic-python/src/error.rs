@@ -1,6 +1,7 @@
 //! Conversion of errors to Python exceptions.
 
 use std::fmt::Display;
+use std::ops::RangeInclusive;
 
 use chaic_env::EnvError;
 use numpy::ndarray::Dimension;
@@ -22,33 +23,82 @@ pub fn no_such(what: &str, k: usize, n: usize) -> PyErr {
     PyIndexError::new_err(format!("there is no {what} {k} of {n}"))
 }
 
+/// Range of numbers that have no other limit than their type.
+pub const ANY_NUMBER: RangeInclusive<u32> = 0..=u32::MAX;
+
+/// Extracts an integer; `name` names it in the error.
+///
+/// # Errors
+/// `ValueError` if it is outside the range, `TypeError` if it is no integer.
+pub fn integer(name: &str, value: &Bound<'_, PyAny>, range: &RangeInclusive<u32>) -> PyResult<u32> {
+    match value.extract::<u32>() {
+        Ok(number) if !range.contains(&number) => Err(out_of_range(name, value, range)),
+        Err(error) if error.is_instance_of::<PyOverflowError>(value.py()) => {
+            Err(out_of_range(name, value, range))
+        }
+        extracted => extracted,
+    }
+}
+
+/// Extracts integers; see [`integer`].
+fn integers(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<u32>> {
+    value.extract().map_err(|error: PyErr| {
+        if error.is_instance_of::<PyOverflowError>(value.py()) {
+            out_of_range(name, value, &ANY_NUMBER)
+        } else {
+            error
+        }
+    })
+}
+
+fn out_of_range(name: &str, value: &Bound<'_, PyAny>, range: &RangeInclusive<u32>) -> PyErr {
+    let (start, end) = (range.start(), range.end());
+    mistake(format!("{name} is {}, expected {start} to {end}", short_repr(value)))
+}
+
 /// Extracts a seed; raises `ValueError` if it is out of range.
 pub fn seed(value: &Bound<'_, PyAny>) -> PyResult<u32> {
-    value.extract().map_err(|error: PyErr| out_of_range(error, "seed", value, u32::MAX.into()))
+    integer("seed", value, &ANY_NUMBER)
 }
 
 /// Extracts seeds; raises `ValueError` if one is out of range.
 pub fn seeds(value: &Bound<'_, PyAny>) -> PyResult<Vec<u32>> {
-    value.extract().map_err(|error: PyErr| out_of_range(error, "seeds", value, u32::MAX.into()))
+    integers("seeds", value)
 }
 
 /// Extracts the number of an agent; raises `ValueError` if it is out of range.
 pub fn agent_number(value: &Bound<'_, PyAny>) -> PyResult<u8> {
-    value.extract().map_err(|error: PyErr| out_of_range(error, "agent", value, u8::MAX.into()))
+    Ok(integer("agent", value, &(0..=u32::from(u8::MAX)))? as u8)
 }
 
 /// Extracts a number of jobs; raises `ValueError` if it is out of range.
 pub fn n_jobs(value: &Bound<'_, PyAny>) -> PyResult<u32> {
-    value.extract().map_err(|error: PyErr| out_of_range(error, "jobs", value, u32::MAX.into()))
+    integer("jobs", value, &ANY_NUMBER)
 }
 
-/// Replaces an `OverflowError` by a `ValueError` that names the range.
-fn out_of_range(error: PyErr, name: &str, value: &Bound<'_, PyAny>, max: u64) -> PyErr {
-    if error.is_instance_of::<PyOverflowError>(value.py()) {
-        mistake(format!("{name} is {}, expected 0 to {max}", short_repr(value)))
-    } else {
-        error
-    }
+/// Extracts the width of a top view, pixels; raises `ValueError` if it is out of range.
+pub fn plan_width(value: &Bound<'_, PyAny>) -> PyResult<u32> {
+    integer("width", value, &(64..=8192))
+}
+
+/// Extracts the side of a semantic map, cells; raises `ValueError` if it is out of range.
+pub fn map_side(value: &Bound<'_, PyAny>) -> PyResult<usize> {
+    Ok(integer("side", value, &(1..=1024))? as usize)
+}
+
+/// Extracts the index of a plan; raises `ValueError` if it is negative.
+pub fn plan_index(value: &Bound<'_, PyAny>) -> PyResult<usize> {
+    Ok(integer("index", value, &ANY_NUMBER)? as usize)
+}
+
+/// Extracts the index of a world; raises `ValueError` if it is negative.
+pub fn world_index(value: &Bound<'_, PyAny>) -> PyResult<usize> {
+    Ok(integer("world", value, &ANY_NUMBER)? as usize)
+}
+
+/// Extracts indices of worlds; raises `ValueError` if one is negative.
+pub fn world_indices(value: &Bound<'_, PyAny>) -> PyResult<Vec<usize>> {
+    Ok(integers("worlds", value)?.into_iter().map(|world| world as usize).collect())
 }
 
 /// Returns an `AttributeError` for an unknown attribute of a class. `renamed` lists old names with their new ones.

@@ -28,7 +28,7 @@ use serde::Deserialize;
 use crate::agent::{PyAgent, agent_error};
 use crate::error::{failure, mistake};
 use crate::isolated::{IsolatedHelper, IsolationOptions};
-use crate::options::{Names, grants, perception, sensors};
+use crate::options::{Names, check_integers, grants, perception, sensors};
 use crate::threads::refuse_fork;
 
 /// Registry of Python helpers and built-in ones.
@@ -217,7 +217,7 @@ pub fn evaluate(
     out: PathBuf,
     granted: Vec<String>,
     images: Vec<String>,
-    image_size: u32,
+    #[pyo3(from_py_with = crate::options::image_size)] image_size: u32,
     #[pyo3(from_py_with = crate::error::n_jobs)] jobs: u32,
     resume: bool,
     shard: Option<&str>,
@@ -227,6 +227,7 @@ pub fn evaluate(
 ) -> PyResult<Option<String>> {
     refuse_fork()?;
     let wrong = |error: pythonize::PythonizeError| PyTypeError::new_err(error.to_string());
+    check_integers(options, &["n_episodes", "seeds"], &(1..=u32::MAX))?;
     let mut keywords: Keywords = depythonize(options).map_err(wrong)?;
     // `Run::open` reports a damaged record.
     let recorded = if resume { RunFolder::read(&out).ok() } else { None };

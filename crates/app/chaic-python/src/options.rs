@@ -1,5 +1,6 @@
 //! Options of worlds, as keywords of Python calls.
 
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use chaic_agents::perception_factory::{GROUND_TRUTH, PerceptionFactory};
@@ -16,7 +17,10 @@ use pyo3::types::PyDict;
 use pythonize::depythonize;
 use serde::Deserialize;
 
-use crate::error::{failure, from_env, mistake};
+use crate::error::{failure, from_env, integer, mistake};
+
+/// Widths and heights of images, pixels.
+pub const IMAGE_SIZES: RangeInclusive<u32> = MIN_IMAGE_SIZE..=MAX_IMAGE_SIZE;
 
 /// Name of agents that the caller controls.
 pub const CALLER: &str = "caller";
@@ -101,6 +105,8 @@ impl Options {
     /// `TypeError` for an unknown keyword or a value of the wrong type, `ValueError` for an invalid value.
     pub fn new(py: Python<'_>, keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Options> {
         warn_of_old_keywords(py, keywords)?;
+        let sizes = ["image_size", "partner_image_size", "minds_image_size"];
+        keywords.map_or(Ok(()), |keywords| check_integers(keywords, &sizes, &IMAGE_SIZES))?;
         let wrong = |error: pythonize::PythonizeError| PyTypeError::new_err(error.to_string());
         let keywords: Keywords =
             keywords.map(|k| depythonize(k).map_err(wrong)).transpose()?.unwrap_or_default();
@@ -115,7 +121,6 @@ impl Options {
             partner_image_size: keywords.partner_image_size,
         };
         if let Some(size) = options.partner_image_size {
-            self::sensors(&[], size)?;
             options.perception.check_image_size(size).map_err(mistake)?;
         }
         if options.sensors.ids && !options.grants.ids {
@@ -167,6 +172,28 @@ impl Options {
         };
         Ok(EpisodeAgents { helper, partner })
     }
+}
+
+/// Extracts the width and height of images, pixels; raises `ValueError` if it is out of range.
+pub fn image_size(value: &Bound<'_, PyAny>) -> PyResult<u32> {
+    integer("image_size", value, &IMAGE_SIZES)
+}
+
+/// Checks the integers among keywords. The deserializer would not name those out of range.
+///
+/// # Errors
+/// `ValueError` if one is outside the range, `TypeError` if it is no integer.
+pub fn check_integers(
+    keywords: &Bound<'_, PyDict>,
+    names: &[&str],
+    range: &RangeInclusive<u32>,
+) -> PyResult<()> {
+    for name in names {
+        if let Some(value) = keywords.get_item(name)?.filter(|value| !value.is_none()) {
+            integer(name, &value, range)?;
+        }
+    }
+    Ok(())
 }
 
 /// Extracts one string, or several of them.
@@ -226,7 +253,7 @@ pub fn grants(names: &[String]) -> PyResult<Grants> {
 /// # Errors
 /// `ValueError` for an unknown kind or a size out of range.
 pub fn sensors(kinds: &[String], image_size: u32) -> PyResult<SensorConfig> {
-    if !(MIN_IMAGE_SIZE..=MAX_IMAGE_SIZE).contains(&image_size) {
+    if !IMAGE_SIZES.contains(&image_size) {
         let range = format!("{MIN_IMAGE_SIZE} to {MAX_IMAGE_SIZE}");
         return Err(mistake(format!("image_size is {image_size}, expected {range}")));
     }

@@ -21,7 +21,7 @@ use pyo3::types::{PyDict, PyList};
 use crate::action::to_object;
 use crate::error::{failure, from_env, mistake, no_attribute, no_such, poisoned};
 use crate::observation::{Briefing, Observation, plain};
-use crate::options::{perception, rule_set, sensors};
+use crate::options::{perception, rule_set};
 
 /// Refuses behavior recognition from images: the worlds of this package record no frame history for it.
 fn check_history(sensors: SensorConfig) -> PyResult<()> {
@@ -190,13 +190,12 @@ impl Planner {
     #[pyo3(signature = (perception="gt", image_size=512, behavior="gt", *, rules="paper", set=Vec::new()))]
     fn new(
         perception: &str,
-        image_size: u32,
+        #[pyo3(from_py_with = crate::options::image_size)] image_size: u32,
         behavior: &str,
         rules: &str,
         #[pyo3(from_py_with = crate::options::strings)] set: Vec<String>,
     ) -> PyResult<Planner> {
         let perception = self::perception(perception, behavior)?;
-        sensors(&[], image_size)?;
         perception.check_image_size(image_size).map_err(mistake)?;
         let policy = ExternalPolicy::default();
         let rules = rule_set(rules, &set)?.planner;
@@ -276,11 +275,11 @@ impl Planner {
     fn semantic_map<'py>(
         &mut self,
         py: Python<'py>,
-        side: usize,
+        #[pyo3(from_py_with = crate::error::map_side)] side: usize,
         cell_m: f32,
     ) -> PyResult<Bound<'py, PyArray3<u8>>> {
-        if !(1..=1024).contains(&side) || !(0.01..=10.0).contains(&cell_m) {
-            return Err(mistake("side is 1 to 1024, cell_m 0.01 to 10 meters"));
+        if !(0.01..=10.0).contains(&cell_m) {
+            return Err(mistake(format!("cell_m is {cell_m}, expected 0.01 to 10 meters")));
         }
         let map = EgocentricMap { side, cell_m };
         let mut out = vec![0; map.len()];
@@ -296,7 +295,7 @@ impl Planner {
     fn choose<'py>(
         &mut self,
         py: Python<'py>,
-        index: usize,
+        #[pyo3(from_py_with = crate::error::plan_index)] index: usize,
     ) -> PyResult<Option<Bound<'py, PyAny>>> {
         let policy = self.agent()?.policy_mut();
         let n = policy.valid().len();

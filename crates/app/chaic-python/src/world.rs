@@ -1,7 +1,8 @@
 //! World: one running episode in Python.
 
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
 
 use chaic_core::geom::Camera;
 use chaic_core::{AgentError, AgentId};
@@ -16,13 +17,17 @@ use pythonize::depythonize;
 
 use crate::action;
 use crate::episode::{Episode, encode_png};
-use crate::error::{agent_number, failure, from_env, mistake, no_attribute, poisoned};
+use crate::error::{
+    ANY_NUMBER, agent_number, failure, from_env, integer, mistake, no_attribute, poisoned,
+};
 use crate::observation::{Briefing, Observation, arrays, plain};
-use crate::options::{Options, sensors, strings};
+use crate::options::{IMAGE_SIZES, Options, sensors, strings};
 use crate::threads::detached;
 
 /// Default width and height of the view of an agent, pixels.
 const VIEW_SIZE: u32 = 512;
+/// Interval of the checks for Ctrl-C in a long call.
+const SIGNAL_INTERVAL: Duration = Duration::from_millis(100);
 
 /// Proprioception, and the mask of actions that the hands allow.
 type ProprioceptionArrays<'py> = (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<bool>>);
@@ -149,20 +154,37 @@ impl World {
     }
 
     /// Runs the episode until an agent of the caller needs an action (`"needs_action"`), the episode has `"ended"`, or
-    /// an agent waits in a frame at or after `until` (`"stopped"`).
+    /// an agent waits in a frame at or after `until` (`"stopped"`). After Ctrl-C, the next call continues.
     #[pyo3(signature = (until=None))]
-    fn advance(&mut self, py: Python<'_>, until: Option<u32>) -> PyResult<&'static str> {
+    fn advance(
+        &mut self,
+        py: Python<'_>,
+        until: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<&'static str> {
+        let until = until.map(|frame| integer("until", frame, &ANY_NUMBER)).transpose()?;
         let World { env, events, .. } = self;
         let env = env.get_mut().map_err(poisoned)?;
+        let (stop, mut interrupt) = (AtomicBool::new(false), None);
+        let mut last_check = Instant::now();
         let outcome = detached(py, || {
-            env.run(&AtomicBool::new(false), until, &mut |record| -> Result<(), AgentError> {
+            env.run(&stop, until, &mut |record| -> Result<(), AgentError> {
                 if let Record::Event(recorded) = record {
                     events.push(recorded.event);
+                }
+                if last_check.elapsed() >= SIGNAL_INTERVAL {
+                    last_check = Instant::now();
+                    if let Err(error) = Python::attach(|py| py.check_signals()) {
+                        stop.store(true, Ordering::Relaxed);
+                        interrupt = Some(error);
+                    }
                 }
                 Ok(())
             })
         })?;
-        outcome.map(outcome_name).map_err(failure)
+        match interrupt {
+            Some(error) => Err(error),
+            None => outcome.map(outcome_name).map_err(failure),
+        }
     }
 
     /// Returns the agents of the caller that need an action now.
@@ -308,7 +330,7 @@ impl World {
         py: Python<'py>,
         agent: Option<&Bound<'py, PyAny>>,
         camera: Option<&Bound<'py, PyAny>>,
-        image_size: Option<u32>,
+        image_size: Option<&Bound<'py, PyAny>>,
         images: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         if camera.is_some() && agent.is_some() {
@@ -318,6 +340,7 @@ impl World {
             return Err(mistake("a camera has its own width and height; give no image_size"));
         }
         let agent = agent.map(agent_number).transpose()?;
+        let image_size = image_size.map(crate::options::image_size).transpose()?;
         let image_size = image_size.unwrap_or(VIEW_SIZE);
         let kinds = images.map_or_else(|| Ok(vec!["rgb".to_owned()]), strings)?;
         let channels = Channels::from(sensors(&kinds, image_size)?);
@@ -326,11 +349,7 @@ impl World {
         let id = self.agent(agent.unwrap_or(default.0))?;
         let env = self.env()?;
         let view = match camera {
-            Some(camera) => {
-                let camera: Camera = depythonize(camera).map_err(mistake)?;
-                check_camera(&camera)?;
-                View::from_camera(camera, channels)
-            }
+            Some(camera) => View::from_camera(parse_camera(camera)?, channels),
             None => View::from_agent(env.world(), id, image_size, channels),
         };
         let (scene, world) = (env.renderer().scene(), env.world());
@@ -355,11 +374,8 @@ impl World {
     fn floor_plan<'py>(
         &mut self,
         py: Python<'py>,
-        width: u32,
+        #[pyo3(from_py_with = crate::error::plan_width)] width: u32,
     ) -> PyResult<Bound<'py, PyArray3<u8>>> {
-        if !(64..=8192).contains(&width) {
-            return Err(mistake(format!("width is {width}, expected 64 to 8192")));
-        }
         let env = self.env()?;
         let (scene, world) = (env.renderer().scene(), env.world());
         let picture = detached(py, || floor_plan::draw_scene_plan(scene, world, width))?;
@@ -393,13 +409,17 @@ fn not_waiting(agent: u8) -> String {
     format!("agent {agent} needs no action now; `waiting()` lists the agents that do")
 }
 
-/// Checks that a camera has a valid image size and a view.
-fn check_camera(camera: &Camera) -> PyResult<()> {
-    [camera.width, camera.height]
-        .into_iter()
-        .try_for_each(|side| sensors(&[], side).map(|_| ()))?;
-    if Projection::from_camera(camera).is_some() {
-        return Ok(());
+/// Parses a camera, and checks that it has a valid image size and a view.
+fn parse_camera(camera: &Bound<'_, PyAny>) -> PyResult<Camera> {
+    for side in ["width", "height"] {
+        // The parser reports a missing side.
+        if let Ok(value) = camera.get_item(side) {
+            integer(side, &value, &IMAGE_SIZES)?;
+        }
+    }
+    let camera: Camera = depythonize(camera).map_err(mistake)?;
+    if Projection::from_camera(&camera).is_some() {
+        return Ok(camera);
     }
     Err(mistake(
         "the camera has no view: eye_in_world is finite, world_from_camera a rotation and \

@@ -11,12 +11,16 @@ use sha2::{Digest as _, Sha256};
 /// Number of hexadecimal digits of a token: 256 random bits.
 const TOKEN_DIGITS: usize = 64;
 
+/// Default port, which browsers leave out.
+const HTTP_PORT: &str = ":80";
+
 /// Names under which browsers reach the server, as in the header `Host`.
 #[derive(Clone, Debug)]
 pub struct AllowedHosts(BTreeSet<String>);
 
 impl AllowedHosts {
-    /// Allows an address, `localhost` if it is a loopback address, and further names with or without port.
+    /// Allows an address, `localhost` if it is a loopback address, and further names with or without port. Names
+    /// with the default port are allowed without it, too.
     pub fn new(address: SocketAddr, names: &[String]) -> AllowedHosts {
         let port = address.port();
         let mut allowed: BTreeSet<String> = [address.to_string()].into();
@@ -29,6 +33,9 @@ impl AllowedHosts {
             }
             allowed.insert(name);
         }
+        let without_port = allowed.iter().filter_map(|name| name.strip_suffix(HTTP_PORT));
+        let without_port: Vec<String> = without_port.map(str::to_owned).collect();
+        allowed.extend(without_port);
         AllowedHosts(allowed)
     }
 
@@ -136,6 +143,11 @@ mod tests {
         }
         let public = AllowedHosts::new("192.0.2.1:80".parse().expect("an address"), &[]);
         assert!(!public.has_host(&with(HOST, &["localhost:80"])));
+        // Browsers leave out the default port.
+        assert!(public.has_host(&with(HOST, &["192.0.2.1"])));
+        assert!(public.has_origin(&with(ORIGIN, &["http://192.0.2.1"])));
+        let other = AllowedHosts::new("192.0.2.1:8080".parse().expect("an address"), &[]);
+        assert!(!other.has_host(&with(HOST, &["192.0.2.1"])));
     }
 
     #[test]

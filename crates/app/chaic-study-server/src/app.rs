@@ -90,6 +90,16 @@ pub fn server_failure(app: &App) -> Response {
     refuse(StatusCode::INTERNAL_SERVER_ERROR, "the server has failed")
 }
 
+/// Closes the episode of a participant after a panic. A repetition would fail again, so the answer lets the page go
+/// on with the next episode.
+pub fn episode_failure(app: &App, code: &str) -> Response {
+    if let Some(play) = &app.play {
+        play.sessions.close(code);
+    }
+    (app.report)("an episode of a participant has failed; this is an error of chaic");
+    refuse(StatusCode::UNPROCESSABLE_ENTITY, "the episode cannot go on")
+}
+
 /// Answers with a refusal, and reports those that the researcher can remedy.
 pub fn refusal_response(app: &App, refusal: &Refusal) -> Response {
     let status = match refusal {

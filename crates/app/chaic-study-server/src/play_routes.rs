@@ -22,7 +22,8 @@ use tokio::task::spawn_blocking;
 
 use crate::access::TokenDigest;
 use crate::app::{
-    App, Play, json_response, no_such_page, read_text, refusal_response, server_failure,
+    App, Play, episode_failure, json_response, no_such_page, read_text, refusal_response,
+    server_failure,
 };
 use crate::limits::MAX_TURN_BYTES;
 use crate::refusal::Refusal;
@@ -106,7 +107,7 @@ async fn simulate<T: Send + 'static>(
     app.store.authorize(&code, &token).map_err(|refusal| refusal_response(&app, &refusal))?;
     let Some(play) = app.play.clone() else { return Err(no_such_page()) };
     let permit = Arc::clone(&play.threads).acquire_owned().await.expect("it is never closed");
-    let shared = Arc::clone(&app);
+    let (shared, participant) = (Arc::clone(&app), code.clone());
     let work = move || {
         // The thread is taken until the work ends, also if nobody waits for the answer.
         let _permit = permit;
@@ -114,6 +115,7 @@ async fn simulate<T: Send + 'static>(
     };
     match spawn_blocking(work).await {
         Ok(performed) => performed.map_err(|refusal| refusal_response(&app, &refusal)),
+        Err(error) if error.is_panic() => Err(episode_failure(&app, &participant)),
         Err(_) => Err(server_failure(&app)),
     }
 }

@@ -225,14 +225,16 @@ impl Sessions {
     }
 }
 
-/// Removes the episodes that have had no turn for [`SESSION_IDLE_SECS`].
+/// Removes the episodes that have had no turn for [`SESSION_IDLE_SECS`] and simulate none now.
 fn take_idle(
     open: &mut BTreeMap<String, Arc<OpenSession>>,
     now_secs: u64,
 ) -> Vec<Arc<OpenSession>> {
     let is_idle = |known: &OpenSession| {
         let last_used_secs = known.last_used_secs.load(Ordering::Relaxed);
+        // A turn in progress stores its part of the trace later. Another session would have the same part.
         now_secs.saturating_sub(last_used_secs) >= SESSION_IDLE_SECS
+            && try_lock(&known.game).is_ok()
     };
     open.extract_if(.., |_, known| is_idle(known)).map(|(_, known)| known).collect()
 }
@@ -368,5 +370,17 @@ mod tests {
         assert!(sessions.find("1", 0).is_err() && sessions.find("9", 0).is_ok());
         sessions.close("9");
         assert!(sessions.find("9", 0).is_err());
+    }
+
+    #[test]
+    fn an_episode_with_a_turn_in_progress_is_not_idle() {
+        let sessions = Sessions::new(&BuiltInHelpers);
+        let open = sessions.entry("1", 0, 0).expect("there is memory");
+        let turn = lock(&open.game);
+        sessions.close_idle(SESSION_IDLE_SECS);
+        assert!(sessions.find("1", 0).is_ok());
+        drop(turn);
+        sessions.close_idle(SESSION_IDLE_SECS);
+        assert!(sessions.find("1", 0).is_err());
     }
 }

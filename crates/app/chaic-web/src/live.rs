@@ -135,6 +135,8 @@ pub struct LiveInfo {
     pub episode: String,
     /// Wanted objects, for example `3 apple`; empty for a person who must find out.
     pub goal: Vec<String>,
+    /// Unit of the value of the goal; empty for a number of objects.
+    pub unit: &'static str,
     /// Kind of person of the person's body: a helper does not learn the partner's.
     pub person: String,
     /// Lowest and highest reach of the person's body, meters.
@@ -333,10 +335,12 @@ impl LiveSession {
         let goal = targets.map(|(class, n)| format!("{n} {}", class.info().label));
         let goal: Vec<String> = goal.filter(|_| self.seat == AgentId::PARTNER).collect();
         let body = setup.people[self.seat.index()].capability();
+        let task = header.task.info();
         LiveInfo {
-            task: header.task.info().title,
+            task: task.title,
             episode: header.episode.clone(),
             goal,
+            unit: task.target_value.unit(),
             person: setup.people[self.seat.index()].kind().to_string(),
             reach_m: body.pick_range_m,
             strength_kg: body.strength_kg,

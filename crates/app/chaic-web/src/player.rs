@@ -70,6 +70,8 @@ pub struct ReplayInfo {
     pub frames_per_second: u32,
     /// Total value of the goal.
     pub total: f64,
+    /// Unit of the value; empty for a number of objects.
+    pub unit: &'static str,
     /// Number of decisions whose digest equals that of the re-simulation.
     pub n_verified: usize,
     /// Number of decisions in the trace.
@@ -261,6 +263,7 @@ impl ReplayPlayer {
             length: self.verified.last_frame(),
             frames_per_second: FRAMES_PER_SECOND,
             total: world.progress().1,
+            unit: header.task.info().target_value.unit(),
             n_verified: self.verified.n_decisions(),
             n_decisions: decisions.len(),
             problem: self.problem.clone(),

@@ -1,7 +1,7 @@
 //! Temporary files of atomic writes.
 
 use std::fs::{self, TryLockError};
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use crate::faults::perform_rename;
@@ -33,9 +33,18 @@ impl TemporaryFile {
     /// # Errors
     /// If a folder has its name, too many processes write `target`, or the file system refuses.
     pub fn beside(target: &Path) -> io::Result<TemporaryFile> {
+        TemporaryFile::with_suffix(target, TEMPORARY_SUFFIX)
+    }
+
+    /// Creates an empty temporary file like [`TemporaryFile::beside`], with another suffix than
+    /// [`TEMPORARY_SUFFIX`].
+    ///
+    /// # Errors
+    /// Those of [`TemporaryFile::beside`].
+    pub fn with_suffix(target: &Path, suffix: &str) -> io::Result<TemporaryFile> {
         for k in 0..MAX_WRITERS {
             let number = if k == 0 { String::new() } else { format!(".{k}") };
-            let path = with_suffix(target, &format!("{number}{TEMPORARY_SUFFIX}"));
+            let path = with_suffix(target, &format!("{number}{suffix}"));
             if let Some(file) = claim(&path)? {
                 return Ok(TemporaryFile {
                     file,
@@ -67,6 +76,12 @@ impl Write for TemporaryFile {
 
     fn flush(&mut self) -> io::Result<()> {
         self.file.flush()
+    }
+}
+
+impl Seek for TemporaryFile {
+    fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
+        self.file.seek(position)
     }
 }
 

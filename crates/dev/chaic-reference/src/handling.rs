@@ -230,10 +230,13 @@ impl Turn<'_> {
         }
         let on = if succeeds { Some(place) } else { None };
         doing.parts.extend([
+            Part::Stand(n.gap),
             Part::Arms(n.reach),
             Part::Stand(n.gap),
             Part::Arms(n.reach),
+            Part::Stand(n.gap),
             drop(objects[0], on, n.max_fall_wait),
+            Part::Stand(n.gap),
             Part::Arms(if is_rider { n.reach } else { n.return_arms }),
         ]);
         Step::Skips

@@ -120,6 +120,11 @@ impl DatasetDescription {
         for tag in self.tags {
             let _ = writeln!(text, "- {tag}");
         }
+        // Without this, the viewer and `load_dataset` mix the records with files of metadata.
+        if let Some(group) = self.files.iter().find(|group| group.name == self.records.files) {
+            text.push_str("configs:\n- config_name: default\n");
+            let _ = writeln!(text, "  data_files: {}", group.pattern);
+        }
         let _ = write!(text, "---\n\n# {}\n\n{}\n\n", self.title, self.summary);
         let _ = write!(text, "## Collection\n\n{}\n\n", self.collection);
         let mut section = |title: &str, items: &[&str]| {

@@ -223,7 +223,8 @@ mod tests {
         let mut writer = EpisodeSetWriter::create(&out).expect("a new folder");
         writer.add(&find_episode("shopping/gen/0").expect("an episode")).expect("a file");
         assert_eq!(writer.finish(Some(&split)).expect("the disk has space"), 1);
-        assert!(out.join("README.md").is_file());
+        let card = std::fs::read_to_string(out.join("README.md")).expect("a card");
+        assert!(card.contains("  data_files: episodes/*.json\n---\n"), "{card}");
     }
 
     #[test]

@@ -102,7 +102,8 @@ fn an_episode_is_exported_as_a_table_and_a_video() {
     let video_path = out.join("videos/observation.images.ego/chunk-000/file-001.mp4");
     assert!(fs::metadata(video_path).unwrap().len() > 1000);
     let card = fs::read_to_string(out.join("README.md")).unwrap();
-    for files in ["`meta/tasks.parquet`", "`meta/episodes/*/*.parquet`"] {
+    let header = "configs:\n- config_name: default\n  data_files: data/*/*.parquet\n---\n";
+    for files in ["`meta/tasks.parquet`", "`meta/episodes/*/*.parquet`", header] {
         assert!(card.contains(files), "{files}: {card}");
     }
     let info: serde_json::Value =

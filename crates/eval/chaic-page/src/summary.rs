@@ -10,7 +10,7 @@ use chaic_env::narration::ActivityKind;
 use chaic_eval::Result;
 use chaic_eval::activity::ActivityTotals;
 use chaic_eval::examples::{Example, ExampleRole, examples, paired_runs};
-use chaic_eval::metrics::{Difference, Metric, Score, Scores};
+use chaic_eval::metrics::{Difference, Interval, Metric, Score, Scores};
 use chaic_eval::published::published;
 use chaic_eval::report::{Format, Labels, Report, number, rounded, shown_interval};
 use chaic_eval::run::RunFolder;
@@ -19,6 +19,9 @@ use serde::Serialize;
 use crate::data_link;
 use crate::overview::{OverviewRow, overview};
 use crate::replays::PageReplay;
+
+/// Minimum number of environments of a stated interval, as in the tables of a report.
+const MIN_ENVIRONMENTS: usize = 3;
 
 /// Report of a run for people.
 #[derive(Clone, Debug, Serialize)]
@@ -228,7 +231,8 @@ fn clock(frame: Frame) -> String {
 }
 
 fn percent(rate: f64) -> String {
-    format!("{:.0} %", 100.0 * rate)
+    // Formatting would round 12.5 to 12, unlike the list of all episodes and the replays.
+    format!("{} %", (100.0 * rate).round())
 }
 
 /// Returns the name of a helper for people.
@@ -274,17 +278,20 @@ fn lead(
     let sentence = format!(
         "With {title}, {rate} of the goal is delivered; without helper, the partner delivers {alone}."
     );
-    match gain_of(differences, helper).and_then(|difference| difference.all) {
-        Some(gain) => {
-            let [mean, low, high] = [gain.mean, gain.low, gain.high].map(|x| rounded(100.0 * x));
-            format!(
-                "{sentence} The gain is {mean} percentage points (95 % interval {low} to {high}, {} \
-                 environments).",
-                gain.environments
-            )
-        }
-        None => format!("{sentence} There are too few environments for an interval."),
-    }
+    let gain = gain_of(differences, helper).and_then(|difference| difference.all);
+    format!("{sentence} {}", gain_sentence(gain))
+}
+
+/// Returns the sentence about the gain over no helper.
+fn gain_sentence(gain: Option<Interval>) -> String {
+    let Some(gain) = gain.filter(|gain| gain.environments >= MIN_ENVIRONMENTS) else {
+        return "There are too few environments for an interval.".to_owned();
+    };
+    let [mean, low, high] = [gain.mean, gain.low, gain.high].map(|x| rounded(100.0 * x));
+    format!(
+        "The gain is {mean} percentage points (95 % interval {low} to {high}, {} environments).",
+        gain.environments
+    )
 }
 
 fn gains(
@@ -413,4 +420,28 @@ fn notes(report: &Report<'_>, helpers: &[String]) -> Vec<String> {
     let simulated = "Partners are simulated; the scores do not tell how people with disabilities judge a helper.";
     let all = report.notes().into_iter().chain(resolution).chain(granted).chain([track]);
     all.chain([simulated.to_owned()]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use chaic_eval::report::interval;
+
+    use super::*;
+
+    #[test]
+    fn the_first_sentence_has_an_interval_if_the_table_has_one() {
+        for environments in 2..5 {
+            let [mean, se, low, high] = [0.25, 0.05, 0.125, 0.375];
+            let gain = Interval { mean, se, low, high, environments, df: environments - 1 };
+            let sentence = gain_sentence(Some(gain));
+            let is_in_table = interval(Some(&gain)).contains('[');
+            assert_eq!(sentence.contains("12.50 to 37.50"), is_in_table, "{sentence}");
+        }
+        assert!(gain_sentence(None).contains("too few environments"));
+    }
+
+    #[test]
+    fn percentages_are_those_of_the_other_parts_of_the_page() {
+        assert_eq!([0.0, 0.125, 0.625, 1.0].map(percent), ["0 %", "13 %", "63 %", "100 %"]);
+    }
 }

@@ -186,15 +186,20 @@ impl HelperRegistry for PolicyRegistry<'_> {
     }
 
     fn check_task(&self, name: &str, task: TaskId) -> Result<(), String> {
-        match self.given(name) {
-            Some(given) if !given.policy.plays(task) => Err(format!(
+        let Some(policy) = self.policy(name) else {
+            return self.fallback.check_task(name, task);
+        };
+        if policy.plays(task) {
+            return Ok(());
+        }
+        Err(match self.given(name) {
+            Some(given) => format!(
                 "{} has no {task}.{EXTENSION}, so `{name}` can't play {task}; add the file, or select \
                  other tasks",
                 given.path.display()
-            )),
-            Some(_) => Ok(()),
-            None => self.fallback.check_task(name, task),
-        }
+            ),
+            None => format!("`{name}` has no policy for {task}; select other tasks"),
+        })
     }
 
     fn fallback(&self) -> Option<&dyn HelperRegistry> {

@@ -168,7 +168,8 @@ impl<T: Trainer> TrainingRun<T> {
     ///
     /// # Errors
     /// If configuration or weights are invalid, the folder is in use or not empty, or a file
-    /// operation fails. The folder then holds no training to resume.
+    /// operation fails. The folder then holds no training to resume, except after
+    /// [`TrainingError::Collection`].
     pub fn start(
         folder: &Path,
         config: &T::Config,
@@ -191,11 +192,9 @@ impl<T: Trainer> TrainingRun<T> {
         let lock = FolderLock::acquire(folder)?;
         // Another process may have started between the first check and the lock.
         check_is_empty(folder)?;
-        let started = start_locked::<T>(folder, config, weights, progress, stop);
-        if started.is_err() {
-            remove_training(folder, T::DATA, is_new);
-        }
-        Ok(started?.map(|trainer| TrainingRun {
+        let started = start_locked::<T>(folder, config, weights, progress, stop)
+            .map_err(|error| clean_up_failed_start(folder, T::DATA, is_new, error))?;
+        Ok(started.map(|trainer| TrainingRun {
             folder: folder.to_owned(),
             trainer,
             pending_metrics: Vec::new(),
@@ -460,8 +459,28 @@ fn other_kind<T: Trainer>(folder: &Path) -> Option<TrainingError> {
     }
 }
 
-/// Removes the files that make a folder a training, and its collected data, after its start failed. A
-/// new folder is removed too if it is then empty.
+/// Returns the error of a failed start. Collected data is kept if a file operation failed, on a full disk
+/// for example: such a training can be resumed. Otherwise the training is removed.
+fn clean_up_failed_start(
+    folder: &Path,
+    data: &[&str],
+    is_new: bool,
+    error: TrainingError,
+) -> TrainingError {
+    let exists = |name: &&str| fs::symlink_metadata(folder.join(name)).is_ok();
+    match error {
+        TrainingError::File(problem) if data.iter().any(exists) => {
+            TrainingError::Collection(problem)
+        }
+        error => {
+            remove_training(folder, data, is_new);
+            error
+        }
+    }
+}
+
+/// Removes the files that make a folder a training, and its collected data. A new folder is removed too
+/// if it is then empty.
 fn remove_training(folder: &Path, data: &[&str], is_new: bool) {
     // The original failure is reported; files that cannot be removed stay.
     for name in [CONFIG, INITIAL_WEIGHTS, CHECKPOINT].iter().chain(data) {

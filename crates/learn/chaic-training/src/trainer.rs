@@ -39,7 +39,7 @@ pub trait Trainer: Sized {
     /// Key of the configuration that names the data of [`Trainer::input_digest`]; empty if there is none.
     const INPUT_KEY: &'static str = "";
     /// Names of files and folders in the folder of the training that [`Trainer::new`] writes. A failed
-    /// start removes them.
+    /// start removes them, unless a file operation failed ([`TrainingError::File`]).
     const DATA: &'static [&'static str] = &[];
 
     /// Prepares the training for its first step; `None` if it was stopped.
@@ -48,7 +48,8 @@ pub trait Trainer: Sized {
     /// `folder`.
     ///
     /// # Errors
-    /// If data cannot be written or read.
+    /// If data cannot be written or read, or is of no use. A failed file operation is
+    /// [`TrainingError::File`].
     fn new(
         config: &Self::Config,
         folder: &Path,
@@ -120,7 +121,11 @@ pub enum TrainingError {
     /// An operation of the file system failed.
     #[error(transparent)]
     File(#[from] FileError),
-    /// Training data cannot be written or read.
+    /// A file operation failed before the first step. The folder keeps the collected data, and the
+    /// training can be resumed.
+    #[error("{0}; the collected data is kept, continue with --resume")]
+    Collection(FileError),
+    /// Training data cannot be used.
     #[error(transparent)]
     Data(Box<dyn Error + Send + Sync>),
     /// The output folder has content.

@@ -46,19 +46,21 @@ impl Batch {
         self.width.div_ceil(2)
     }
 
-    /// Depth along the camera axis, f32 meters, shape [view, height, width].
+    /// Depth along the camera axis, f32 meters, shape [view, height, width]. It is rendered for
+    /// every view, requested or not; `None` if the batch has no pixels.
     pub fn depth(&self) -> Option<&wgpu::Buffer> {
         self.outputs.as_ref().map(|o| &o.depth)
     }
 
     /// Instance ids, u16, shape [view, height, width rounded up to a multiple of 2], as
-    /// little-endian pairs.
+    /// little-endian pairs. They are rendered for every view, requested or not; `None` if the batch
+    /// has no pixels.
     pub fn ids(&self) -> Option<&wgpu::Buffer> {
         self.outputs.as_ref().map(|o| &o.ids)
     }
 
     /// Display color, u8, shape [view, height, width, 4] (red, green, blue, 255); `None` if no view
-    /// requested it.
+    /// requested it, or the batch has no pixels.
     pub fn color(&self) -> Option<&wgpu::Buffer> {
         let has_color = self.channels.iter().any(|c| c.rgb);
         self.outputs.as_ref().map(|o| &o.color).filter(|_| has_color)

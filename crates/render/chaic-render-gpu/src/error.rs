@@ -75,10 +75,12 @@ pub enum GpuError {
         /// Height of the first view, pixels.
         first_height: u32,
     },
-    /// The images of a batch do not fit into a device buffer.
+    /// The images of a batch do not fit into a device buffer, or a side is over
+    /// [`MAX_SIDE_PX`](chaic_render::MAX_SIDE_PX).
     #[error(
-        "a batch of {views} views of {width}x{height} pixels exceeds the limits of this adapter; \
-         render at most {max} at a time"
+        "a batch of {views} views of {width}x{height} pixels is too large; render at most {max} \
+         at a time, with sides of at most {} pixels",
+        chaic_render::MAX_SIDE_PX
     )]
     TooLargeBatch {
         /// Number of views.

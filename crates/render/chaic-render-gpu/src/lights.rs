@@ -38,21 +38,37 @@ impl Lights {
         })
     }
 
-    /// Uploads the lighting of a world.
+    /// Uploads the lighting of a world. Frees its ranges after an error.
     pub fn add(&mut self, context: &GpuContext, light: &Lighting) -> Result<PlacedLight, GpuError> {
+        let mut placed = PlacedLight::default();
+        match self.fill(context, light, &mut placed) {
+            Ok(()) => Ok(placed),
+            Err(error) => {
+                self.remove(placed);
+                Err(error)
+            }
+        }
+    }
+
+    fn fill(
+        &mut self,
+        context: &GpuContext,
+        light: &Lighting,
+        placed: &mut PlacedLight,
+    ) -> Result<(), GpuError> {
         let lamp_records = light.lamps_in_world.iter().map(|[x, y, z]| [*x, *y, *z, 0.0]);
         let ground = &light.cells;
-        let lamps = self.lamps.add(context, &lamp_records.collect::<Vec<_>>())?;
-        let cells = self.cells.add(context, &words(ground, 0..ground.n_z))?;
+        placed.lamps = self.lamps.add(context, &lamp_records.collect::<Vec<_>>())?;
+        placed.cells = self.cells.add(context, &words(ground, 0..ground.n_z))?;
         let record = LightRecord {
             to_sun: light.to_sun,
             ceiling_m: light.ceiling_m.unwrap_or(NO_CEILING_M),
             sun: light.sun,
-            first_lamp: lamps.start,
+            first_lamp: placed.lamps.start,
             lamp: light.lamp,
-            n_lamps: lamps.end - lamps.start,
+            n_lamps: placed.lamps.end - placed.lamps.start,
             outdoors_high: light.outdoors[0],
-            first_cell: cells.start,
+            first_cell: placed.cells.start,
             outdoors_low: light.outdoors[1],
             n_x: ground.n_x as u32,
             indoors_high: light.indoors[0],
@@ -66,9 +82,10 @@ impl Lights {
             below: light.sky[2],
             padding: 0,
         };
-        let record = self.records.add(context, &[record])?;
-        let (version, changed_rows) = (ground.version, ground.changed_rows().collect());
-        Ok(PlacedLight { record, lamps, cells, version, changed_rows })
+        placed.record = self.records.add(context, &[record])?;
+        placed.version = ground.version;
+        placed.changed_rows = ground.changed_rows().collect();
+        Ok(())
     }
 
     /// Uploads the changed ground cells of another frame of the same scene.

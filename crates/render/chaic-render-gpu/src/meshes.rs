@@ -34,7 +34,7 @@ struct SharedMesh {
 }
 
 /// Ranges of a mesh in the pools.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct MeshRanges {
     vertices: Range<u32>,
     triangles: Range<u32>,
@@ -101,23 +101,30 @@ impl Meshes {
         key: u128,
     ) -> Result<u32, GpuError> {
         let (ranges, record) = self.upload_ranges(context, mesh)?;
-        let record = self.records.add(context, &[record])?;
+        let record = match self.records.add(context, &[record]) {
+            Ok(record) => record,
+            Err(error) => {
+                self.remove_ranges(ranges);
+                return Err(error);
+            }
+        };
         let first = record.start;
         self.stored.insert(key, SharedMesh { shape_ids: Vec::new(), record, ranges, users: 1 });
         Ok(first)
     }
 
-    /// Uploads the data of a mesh; returns its ranges and its record, which is not uploaded.
+    /// Uploads the data of a mesh; returns its ranges and its record, which is not uploaded. Frees
+    /// the ranges after an error.
     pub fn upload_ranges(
         &mut self,
         context: &GpuContext,
         mesh: &PackedMesh,
     ) -> Result<(MeshRanges, MeshRecord), GpuError> {
-        let ranges = MeshRanges {
-            vertices: self.vertices.add(context, &mesh.vertices)?,
-            triangles: self.triangles.add(context, &mesh.triangles)?,
-            materials: self.materials.add(context, &mesh.materials)?,
-        };
+        let mut ranges = MeshRanges::default();
+        if let Err(error) = self.fill_ranges(context, mesh, &mut ranges) {
+            self.remove_ranges(ranges);
+            return Err(error);
+        }
         let mut record = mesh.record;
         for level in &mut record.levels {
             level[0] += ranges.vertices.start;
@@ -125,6 +132,18 @@ impl Meshes {
             level[3] += ranges.materials.start;
         }
         Ok((ranges, record))
+    }
+
+    fn fill_ranges(
+        &mut self,
+        context: &GpuContext,
+        mesh: &PackedMesh,
+        ranges: &mut MeshRanges,
+    ) -> Result<(), GpuError> {
+        ranges.vertices = self.vertices.add(context, &mesh.vertices)?;
+        ranges.triangles = self.triangles.add(context, &mesh.triangles)?;
+        ranges.materials = self.materials.add(context, &mesh.materials)?;
+        Ok(())
     }
 
     /// Removes the data of a mesh.

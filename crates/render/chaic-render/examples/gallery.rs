@@ -41,8 +41,8 @@ fn main() -> Result<()> {
     let n = house.setup().things.len();
     let up_to = LEVEL_RADIUS_PX[..counts.len() - 1].iter().map(f32::to_string);
     println!(
-        "triangles of a house of eight rooms with {n} things: {}; levels for half diagonals up to {} \
-         pixels, and above",
+        "triangles of a house of eight rooms with {n} things: {}; levels for half of the longer side \
+         up to {} pixels, and above",
         counts.join(", "),
         up_to.collect::<Vec<_>>().join(", ")
     );

@@ -1,8 +1,8 @@
 //! Animated GIF with 256 colors per frame, for places that do not play video.
 
-use std::io::{BufWriter, Write as _};
+use std::io::{BufWriter, IntoInnerError};
 
-use chaic_files::OutputFile;
+use chaic_files::TemporaryFile;
 use gif::{DisposalMethod, Encoder, EncodingError, Frame, Repeat};
 use image::RgbImage;
 
@@ -13,14 +13,14 @@ const PALETTE_SPEED: i32 = 10;
 
 /// Animated GIF writer.
 pub(super) struct GifSink {
-    encoder: Encoder<BufWriter<OutputFile>>,
+    encoder: Encoder<BufWriter<TemporaryFile>>,
     fps: u32,
     n_frames: u32,
 }
 
 impl GifSink {
     pub(super) fn open(
-        out: BufWriter<OutputFile>,
+        out: BufWriter<TemporaryFile>,
         width: u32,
         height: u32,
         fps: u32,
@@ -45,9 +45,8 @@ impl GifSink {
     }
 
     pub(super) fn finish(self) -> Result<(), SinkError> {
-        let mut out = self.encoder.into_inner()?;
-        out.flush()?;
-        Ok(out.get_ref().sync_all()?)
+        let out = self.encoder.into_inner()?;
+        Ok(out.into_inner().map_err(IntoInnerError::into_error)?.commit()?)
     }
 }
 

@@ -13,7 +13,7 @@ mod yuv;
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
-use chaic_files::{OutputFile, create_or_replace, remove_file, rename};
+use chaic_files::TemporaryFile;
 use image::RgbImage;
 
 /// File name extensions that this build supports.
@@ -112,39 +112,10 @@ pub struct VideoWriter {
     height: u32,
     n_frames: u32,
     sink: Sink,
-    partial_file: PartialFile,
 }
 
-/// Temporary file of an unfinished video. It is renamed when the video is complete, and removed
-/// otherwise.
-#[derive(Debug)]
-struct PartialFile {
-    path: PathBuf,
-    is_kept: bool,
-}
-
-impl PartialFile {
-    fn for_path(path: &Path) -> PartialFile {
-        let mut name = path.file_name().unwrap_or_default().to_owned();
-        name.push(".partial");
-        PartialFile { path: path.with_file_name(name), is_kept: false }
-    }
-
-    fn rename_to(mut self, path: &Path) -> io::Result<()> {
-        rename(&self.path, path).map_err(|e| e.error)?;
-        self.is_kept = true;
-        Ok(())
-    }
-}
-
-impl Drop for PartialFile {
-    fn drop(&mut self) {
-        if !self.is_kept {
-            // If it cannot be removed, its name shows that it is partial.
-            let _ = remove_file(&self.path);
-        }
-    }
-}
+/// Suffix of the temporary file of an unfinished video.
+const PARTIAL_SUFFIX: &str = ".partial";
 
 #[derive(Debug)]
 enum Sink {
@@ -170,8 +141,9 @@ impl VideoWriter {
     /// Starts a video of `width` x `height` pixels at `path`, whose extension selects the format.
     ///
     /// H.264 halves the resolution of color, so an odd side of an MP4 is padded by one repeated
-    /// pixel. The video is written to `PATH.partial`, which replaces an existing file when the
-    /// video is finished.
+    /// pixel. The video is written to `PATH.partial`, or to `PATH.K.partial` while others write the
+    /// same video. This file replaces an existing one when the video is finished. It is removed if
+    /// the writer is dropped before.
     pub fn create(
         path: &Path,
         width: u32,
@@ -187,12 +159,11 @@ impl VideoWriter {
         if !(1..=max).contains(&fps) {
             return Err(VideoError::FrameRate { fps, max });
         }
-        let partial_file = PartialFile::for_path(path);
-        let sink = create_or_replace(&partial_file.path)
+        let sink = TemporaryFile::with_suffix(path, PARTIAL_SUFFIX)
             .map_err(SinkError::Io)
             .and_then(|file| Sink::open(format, BufWriter::new(file), width, height, fps))
             .map_err(|error| error.into_video_error(path, 0))?;
-        Ok(VideoWriter { path: path.to_owned(), width, height, n_frames: 0, sink, partial_file })
+        Ok(VideoWriter { path: path.to_owned(), width, height, n_frames: 0, sink })
     }
 
     /// Adds the next frame, which must have the size of the video.
@@ -228,7 +199,6 @@ impl VideoWriter {
             #[cfg(feature = "mp4")]
             Sink::Mp4(sink) => sink.finish(),
         }
-        .and_then(|()| self.partial_file.rename_to(&self.path).map_err(SinkError::Io))
         .map_err(|error| error.into_video_error(&self.path, self.n_frames))
     }
 }
@@ -236,7 +206,7 @@ impl VideoWriter {
 impl Sink {
     fn open(
         format: Format,
-        out: BufWriter<OutputFile>,
+        out: BufWriter<TemporaryFile>,
         width: u32,
         height: u32,
         fps: u32,

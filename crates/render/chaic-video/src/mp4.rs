@@ -1,9 +1,9 @@
 //! H.264 in MP4: OpenH264 encodes, `shiguredo_mp4` writes the container.
 
-use std::io::{BufWriter, Seek as _, SeekFrom, Write as _};
+use std::io::{BufWriter, IntoInnerError, Seek as _, SeekFrom, Write as _};
 use std::num::NonZeroU32;
 
-use chaic_files::OutputFile;
+use chaic_files::TemporaryFile;
 use image::RgbImage;
 use openh264::OpenH264API;
 use openh264::encoder::{
@@ -34,7 +34,7 @@ const INDEX_BYTES: usize = 16 * 1024;
 
 /// MP4 writer.
 pub(super) struct Mp4Sink {
-    out: BufWriter<OutputFile>,
+    out: BufWriter<TemporaryFile>,
     position: u64,
     encoder: Encoder,
     muxer: Mp4FileMuxer,
@@ -45,7 +45,7 @@ pub(super) struct Mp4Sink {
 
 impl Mp4Sink {
     pub(super) fn open(
-        mut out: BufWriter<OutputFile>,
+        mut out: BufWriter<TemporaryFile>,
         width: u32,
         height: u32,
         fps: u32,
@@ -104,8 +104,7 @@ impl Mp4Sink {
             self.out.seek(SeekFrom::Start(offset))?;
             self.out.write_all(bytes)?;
         }
-        self.out.flush()?;
-        Ok(self.out.get_ref().sync_all()?)
+        Ok(self.out.into_inner().map_err(IntoInnerError::into_error)?.commit()?)
     }
 }
 

@@ -68,6 +68,24 @@ fn an_unfinished_video_keeps_the_old_file() {
 }
 
 #[test]
+fn writers_of_the_same_video_do_not_mix() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("same.gif");
+    let [one, two] = [1, 2].map(|n| write(&dir.path().join(format!("{n}.gif")), 64, 48, n));
+    let mut first = VideoWriter::create(&path, 64, 48, 10).unwrap();
+    let mut second = VideoWriter::create(&path, 64, 48, 10).unwrap();
+    first.push(&frame(64, 48, 0)).unwrap();
+    for index in 0..2 {
+        second.push(&frame(64, 48, index)).unwrap();
+    }
+    first.finish().unwrap();
+    assert!(std::fs::read(&path).unwrap() == one);
+    second.finish().unwrap();
+    assert!(std::fs::read(&path).unwrap() == two);
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 3);
+}
+
+#[test]
 fn invalid_requests_are_refused() {
     let dir = tempfile::tempdir().unwrap();
     let gif = dir.path().join("a.gif");

@@ -84,6 +84,7 @@ struct EpisodeFile {
 
 /// Fields that decide whether the file can be read.
 #[derive(Deserialize)]
+#[serde(expecting = "an object with the fields of an episode")]
 struct Header {
     format: Option<serde_json::Value>,
     version: Option<serde_json::Value>,

@@ -17,7 +17,7 @@ const STAND_FRAMES: u32 = 3;
 /// A last position this near to the body is useless if the person is no longer in view, meters.
 const LOST_M: f32 = 0.9;
 /// Turns to search for a lost person: a full circle with a field of view of 90 degrees.
-const SEARCH_TURNS: u32 = 18;
+pub const SEARCH_TURNS: u32 = 18;
 /// A person nearer than this may want to pass, meters. Ours, as all constants of giving way.
 const CLOSE_M: f32 = 1.5;
 /// Time for which it must be so near, frames.

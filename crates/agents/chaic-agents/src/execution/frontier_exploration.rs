@@ -51,7 +51,6 @@ struct Target {
     /// A point just beyond the frontier.
     beyond: Vec2,
     is_frontier: bool,
-    since: Frame,
     n_turns: u32,
 }
 
@@ -65,7 +64,7 @@ struct FrontierCluster {
     reached: Option<(f32, usize)>,
 }
 
-/// Explores; keeps its target between decisions.
+/// Explores; keeps its target during a plan.
 #[derive(Clone, Debug)]
 pub struct FrontierExplorer {
     bounds: Rect,
@@ -78,6 +77,11 @@ impl FrontierExplorer {
     /// Creates an explorer of the area inside `bounds`.
     pub fn new(bounds: Rect) -> FrontierExplorer {
         FrontierExplorer { bounds, target: None, blacklist: Vec::new(), is_exhausted: false }
+    }
+
+    /// Drops the target of the previous plan.
+    pub fn reset(&mut self) {
+        self.target = None;
     }
 
     /// Returns whether no frontier was left at the last search.
@@ -96,9 +100,6 @@ impl FrontierExplorer {
     pub fn step(&mut self, memory: &mut Memory, navigator: &mut dyn Navigator) -> ExplorationStep {
         let now = memory.frame;
         self.blacklist.retain(|(_, until)| *until > now);
-        if self.target.is_some_and(|t| now > t.since + memory.rules.plan_timeouts.explore_frames) {
-            self.give_up(now);
-        }
         if let Some(target) = self.target
             && target.is_frontier
             && !self.has_frontier_near(memory, target.at)
@@ -226,7 +227,7 @@ impl FrontierExplorer {
         let at = grid.center(cell);
         let side = self.unknown_side(memory, cell).map_or(at, |c| grid.center(c));
         let beyond = at + 4.0 * (side - at);
-        Some(Target { at, beyond, is_frontier: true, since: memory.frame, n_turns: 0 })
+        Some(Target { at, beyond, is_frontier: true, n_turns: 0 })
     }
 
     /// Returns the frontiers that are long enough and not ignored, in the order of their first cells.
@@ -307,13 +308,7 @@ impl FrontierExplorer {
                 best = Some((score, at));
             }
         }
-        best.map(|(_, at)| Target {
-            at,
-            beyond: at,
-            is_frontier: false,
-            since: memory.frame,
-            n_turns: 0,
-        })
+        best.map(|(_, at)| Target { at, beyond: at, is_frontier: false, n_turns: 0 })
     }
 }
 
@@ -402,28 +397,54 @@ mod tests {
         }
     }
 
+    /// Returns the memory of a known room in the west with a shadow of 0.75 by 0.75 m in its corner, and
+    /// a door to an unknown room in the east, for an agent at this position.
+    fn shadow_and_door(exploration: Exploration, at: [f32; 2]) -> (Toy, Memory) {
+        let toy = Toy::room(12.0, 6.0);
+        let rules = crate::PlannerRules { exploration, ..crate::PlannerRules::paper() };
+        let mut memory = Memory::new(&toy.briefing(), rules);
+        let grid = *memory.map.grid();
+        let state = |cell| {
+            let Vec2 { x, y: z } = grid.center(cell);
+            match () {
+                () if x.abs() > 6.0 || z.abs() > 3.0 => CellOccupancy::Wall,
+                () if x.abs() < 0.1 && z.abs() > 0.6 => CellOccupancy::Wall,
+                () if x > 0.0 || (x < -5.25 && z < -2.25) => CellOccupancy::Unknown,
+                () => CellOccupancy::Free,
+            }
+        };
+        let cells: Vec<CellOccupancy> = (0..grid.n_cells()).map(state).collect();
+        memory.map = OccupancyMap::from_cells(grid, &cells);
+        memory.pose.position = Vec3::new(at[0], 0.0, at[1]);
+        (toy, memory)
+    }
+
+    #[test]
+    fn a_plan_keeps_its_frontier_and_the_next_plan_chooses_again() {
+        let (toy, mut at_shadow) = shadow_and_door(Exploration::Frontier, [-4.0, -1.5]);
+        let (_, mut at_door) = shadow_and_door(Exploration::Frontier, [-1.5, 0.0]);
+        let mut explorer = FrontierExplorer::new(toy.bounds());
+        let mut navigator = CarefulNavigator::default();
+        let mut target_x = |explorer: &mut FrontierExplorer, memory: &mut Memory| {
+            explorer.step(memory, &mut navigator);
+            explorer.target.expect("two frontiers").at.x
+        };
+        let shadow = target_x(&mut explorer, &mut at_shadow);
+        // Long after, another plan has led the agent to the door.
+        at_door.frame += 10 * at_door.rules.plan_timeouts.explore_frames;
+        assert_eq!(target_x(&mut explorer, &mut at_door), shadow);
+        explorer.reset();
+        let door = target_x(&mut explorer, &mut at_door);
+        assert!(shadow < -4.5 && door > -0.5, "{shadow}, {door}");
+        // The shadow can be chosen again.
+        explorer.reset();
+        assert_eq!(target_x(&mut explorer, &mut at_shadow), shadow);
+    }
+
     #[test]
     fn a_large_unknown_room_is_preferred_to_a_small_shadow_that_is_nearer() {
-        // Known room in the west with a shadow of 0.75 by 0.75 m in its corner; a door to an unknown
-        // room in the east, twice as far away.
-        let toy = Toy::room(12.0, 6.0);
-        let briefing = toy.briefing();
         let chosen = |exploration| {
-            let rules = crate::PlannerRules { exploration, ..crate::PlannerRules::paper() };
-            let mut memory = Memory::new(&briefing, rules);
-            let grid = *memory.map.grid();
-            let state = |cell| {
-                let Vec2 { x, y: z } = grid.center(cell);
-                match () {
-                    () if x.abs() > 6.0 || z.abs() > 3.0 => CellOccupancy::Wall,
-                    () if x.abs() < 0.1 && z.abs() > 0.6 => CellOccupancy::Wall,
-                    () if x > 0.0 || (x < -5.25 && z < -2.25) => CellOccupancy::Unknown,
-                    () => CellOccupancy::Free,
-                }
-            };
-            let cells: Vec<CellOccupancy> = (0..grid.n_cells()).map(state).collect();
-            memory.map = OccupancyMap::from_cells(grid, &cells);
-            memory.pose.position = Vec3::new(-4.0, 0.0, -1.5);
+            let (toy, mut memory) = shadow_and_door(exploration, [-4.0, -1.5]);
             let mut explorer = FrontierExplorer::new(toy.bounds());
             let target = explorer.choose(&mut memory).expect("two frontiers");
             assert!(target.is_frontier && !explorer.is_exhausted());
@@ -479,7 +500,7 @@ mod tests {
             let at = grid.center(cell);
             let side = explorer.unknown_side(memory, cell).map_or(at, |c| grid.center(c));
             let beyond = at + 4.0 * (side - at);
-            Target { at, beyond, is_frontier: true, since: memory.frame, n_turns: 0 }
+            Target { at, beyond, is_frontier: true, n_turns: 0 }
         });
         (target, n_frontiers)
     }

@@ -41,6 +41,7 @@ pub struct Recovery {
 impl Recovery {
     /// Resets the state for a new plan.
     pub fn reset(&mut self) {
+        self.queue.clear();
         self.recent_positions.clear();
         self.n_bumps = self.n_bumps.min(2);
     }
@@ -165,6 +166,17 @@ mod tests {
             recovery.step(&mut memory, BLOCKED, &mut rng);
         }
         assert!(recovery.should_give_up());
+    }
+
+    #[test]
+    fn a_new_plan_does_not_continue_to_back_off() {
+        let toy = Toy::room(6.0, 6.0);
+        let mut memory = Memory::new(&toy.briefing(), crate::PlannerRules::paper());
+        memory.refresh();
+        let (mut recovery, mut rng) = (Recovery::default(), RngStream::new(1, "test", 0));
+        assert!(recovery.step(&mut memory, BLOCKED, &mut rng).is_some());
+        recovery.reset();
+        assert_eq!(recovery.step::<()>(&mut memory, None, &mut rng), None);
     }
 
     #[test]

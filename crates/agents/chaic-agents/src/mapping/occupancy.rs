@@ -28,6 +28,8 @@ const CONFIDENCE_STEP: u8 = 3;
 const MAX_CONFIDENCE: u8 = 6;
 /// Side of the coarse squares that record when a place was last seen, cells (1 m).
 const PLACE_CELLS: usize = 8;
+/// Added to the row of a projected point, pixels: more than the rounding error of the projection.
+const ROW_ROUNDING: f32 = 1e-3;
 
 /// State of one cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -295,7 +297,7 @@ impl OccupancyMap {
     fn mark_area_at_feet(&mut self, depth: &[f32], camera: &Camera) -> bool {
         let eye = to_xz(camera.eye_in_world);
         let reach_m = camera.eye_in_world.y + 0.2;
-        let level = (camera.height / 2) as usize * camera.width as usize;
+        let (width, height) = (camera.width as f32, camera.height as f32);
         let mut changed = false;
         for cell in self.grid.disc(eye, reach_m) {
             if self.seen_bits[cell] & (SEEN_FREE | SEEN_BELOW_VIEW) != 0
@@ -306,10 +308,12 @@ impl OccupancyMap {
             let center = self.grid.center(cell);
             let point = Vec3::new(center.x, camera.eye_in_world.y, center.y);
             let Some((px, d)) = camera.project(point) else { continue };
-            if px.x < 0.0 || px.x >= camera.width as f32 {
+            // The height of a level camera is at the border of two rows.
+            let row = px.y + ROW_ROUNDING;
+            if !(0.0..width).contains(&px.x) || !(0.0..height).contains(&row) {
                 continue;
             }
-            if depth[level + px.x as usize] > d {
+            if depth[row as usize * camera.width as usize + px.x as usize] > d {
                 self.seen_bits[cell] |= SEEN_BELOW_VIEW;
                 changed = true;
             }
@@ -351,6 +355,32 @@ mod tests {
         assert_ne!(state(&map, -1.0, -1.9), CellOccupancy::Occupied, "an apple does not block");
         let near = map.grid().cell_at(Vec2::new(0.0, -1.0)).expect("inside");
         assert!(!map.is_unexplored(near), "just before the feet");
+    }
+
+    #[test]
+    fn the_area_at_the_feet_is_seen_at_eye_height_with_a_level_and_with_a_lowered_gaze() {
+        use chaic_core::geom::pitch_rotation;
+        // Row at eye height: tan(30°) of 32 rows above the center with the lowered gaze.
+        for (lowered_rad, level_row) in [(0.0, 32), (std::f32::consts::FRAC_PI_6, 13)] {
+            let camera = Camera {
+                eye_in_world: Vec3::new(0.0, 1.65, 0.0),
+                world_from_camera: pitch_rotation(-lowered_rad),
+                vertical_fov_rad: Camera::EYE_FOV_RAD,
+                width: 64,
+                height: 64,
+            };
+            for far_row in [level_row, level_row + 1] {
+                let depth: Vec<f32> = (0..64 * 64)
+                    .map(|pixel| if pixel / 64 == far_row { 10.0 } else { 0.1 })
+                    .collect();
+                let toy = Toy::room(6.0, 6.0);
+                let mut map = OccupancyMap::new(&toy.bounds(), MOTION.step_over_m);
+                let is_marked = map.mark_area_at_feet(&depth, &camera);
+                assert_eq!(is_marked, far_row == level_row, "{lowered_rad} rad, row {far_row}");
+                let ahead = map.grid().cell_at(Vec2::new(0.0, -1.0)).expect("inside");
+                assert_eq!(map.is_unexplored(ahead), !is_marked);
+            }
+        }
     }
 
     #[test]

@@ -199,6 +199,13 @@ impl MappedObject {
         !self.class.info().is_carriable() && (has_moved || self.footprint.len() != n_points)
     }
 
+    /// Returns whether the object is on the path of the agents wherever it stands: an obstacle or a
+    /// piece of furniture that can be moved. The others are part of the occupancy map or too small.
+    pub fn blocks_path(&self) -> bool {
+        let info = self.class.info();
+        info.is_movable() && !info.is_carriable()
+    }
+
     /// Adds points to the footprint. Most sightings of fixed objects show known points only.
     fn merge_footprint(&mut self, points: &[Vec2]) {
         if !is_merge_unchanged(&self.footprint, points) {
@@ -312,12 +319,14 @@ impl SemanticMap {
                 }
             }
             if let Some(object) = self.objects.get_mut(&detection.track) {
+                let was_held = object.held_until > now;
                 if is_held {
                     object.held_until = now + seen_held_ignore_frames;
-                } else if object.held_until > now {
+                } else if was_held {
                     object.held_until = 0;
                     self.n_changes += 1;
                 }
+                self.layout_version += u32::from(is_held != was_held && object.blocks_path());
             }
         }
     }
@@ -361,6 +370,7 @@ impl SemanticMap {
         for object in self.objects.values_mut() {
             // A granted state includes the release of an object.
             let is_released = object.placement.is_none() && passed(object.held_until);
+            self.layout_version += u32::from(is_released && object.blocks_path());
             if passed(object.ignore_until) || is_released {
                 self.n_changes += 1;
                 object.failures = 0;
@@ -437,6 +447,7 @@ impl SemanticMap {
     pub fn mark_held(&mut self, track: TrackId, until: Frame) {
         if let Some(object) = self.objects.get_mut(&track) {
             object.held_until = until;
+            self.layout_version += u32::from(object.blocks_path());
         }
     }
 

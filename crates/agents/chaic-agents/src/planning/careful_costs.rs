@@ -91,8 +91,7 @@ fn collect_states(costs: &CostMap, inputs: &CostInputs<'_>, states: &mut Vec<u8>
     states.clear();
     states.extend(map.cells().map(|cell| cell.state() as u8));
     for object in objects.iter().filter(|o| o.is_present && now >= o.held_until) {
-        let info = object.class.info();
-        if info.is_movable() && !info.is_carriable() {
+        if object.blocks_path() {
             // An obstacle at the body's own position cannot be there; otherwise the body could
             // not move away.
             let points = object.footprint.iter().filter(|p| p.distance(position) > BODY_MARGIN_M);

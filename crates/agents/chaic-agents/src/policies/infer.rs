@@ -12,12 +12,14 @@ use chaic_core::briefing::{CompanionRole, Goal};
 use chaic_core::capability::{Capability, Persona};
 use chaic_core::geom::to_xz;
 use chaic_core::rng::RngStream;
-use chaic_core::{AgentError, Briefing, ClassId, Frame, Observation, Role};
+use chaic_core::{Action, AgentError, Briefing, ClassId, Frame, Observation, Role};
 
 use super::rule_policy::{RulePolicy, is_relevant_removal};
 use crate::behavior::BehaviorLog;
 use crate::belief::Belief;
 use crate::decision::{Context, HandState, Plan, Policy, Subject};
+use crate::execution::follow::SEARCH_TURNS;
+use crate::mapping::TrackedPerson;
 use crate::memory::Memory;
 use crate::rules::RuleProfile;
 use crate::team::builder::{PartnerModel, ProblemBuilder};
@@ -55,6 +57,9 @@ mod constants {
     /// Time after a sighting for which the helper follows the partner while the goal is unclear,
     /// frames. Later it explores, which finds the partner sooner.
     pub const LOST_FRAMES: Frame = 200;
+    /// Distance from the partner's last position within which turns count as a search for it, meters: that
+    /// at which a follower stops to look around, and a step.
+    pub const SEARCH_RADIUS_M: f32 = 1.3;
     /// Goals with a lower probability are left out of the plan: to explore is better than to fetch
     /// objects that are probably unwanted.
     pub const MIN_GOAL_PROBABILITY: f32 = 0.15;
@@ -102,7 +107,32 @@ pub struct InferPolicy {
     /// Frame in which the goal became clear.
     identified: Option<Frame>,
     last_choice: Frame,
+    search: PartnerSearch,
     mode: &'static str,
+}
+
+/// Search for the partner where it was seen last.
+#[derive(Clone, Copy, Debug, Default)]
+struct PartnerSearch {
+    /// Turns near that position since the last sighting.
+    n_turns: u32,
+}
+
+impl PartnerSearch {
+    fn observe(&mut self, memory: &Memory, partner: Option<&TrackedPerson>) {
+        let Some(lost) = partner.filter(|p| !p.is_in_view) else {
+            self.n_turns = 0;
+            return;
+        };
+        let has_turned = matches!(memory.last, Some((Action::TurnLeft | Action::TurnRight, _)));
+        let distance_m = to_xz(lost.position_in_world).distance(memory.position());
+        self.n_turns += u32::from(has_turned && distance_m < SEARCH_RADIUS_M);
+    }
+
+    /// Returns whether the partner was not found: to search there again is useless.
+    fn has_failed(&self) -> bool {
+        self.n_turns >= SEARCH_TURNS
+    }
 }
 
 impl InferPolicy {
@@ -121,6 +151,7 @@ impl InferPolicy {
             has_looked_around: false,
             identified: None,
             last_choice: 0,
+            search: PartnerSearch::default(),
             mode: "watch",
         }
     }
@@ -269,7 +300,11 @@ impl InferPolicy {
         let goal = self.most_likely_goal(context.briefing);
         let briefing = Briefing { goal, ..context.briefing.clone() };
         match self.rules.decide(&Context { briefing: &briefing, ..*context }, &others) {
-            Plan::Explore if context.is_explored && valid.contains(&Plan::FollowPartner) => {
+            Plan::Explore
+                if context.is_explored
+                    && valid.contains(&Plan::FollowPartner)
+                    && !self.search.has_failed() =>
+            {
                 Plan::FollowPartner
             }
             plan => plan,
@@ -297,7 +332,7 @@ impl InferPolicy {
         }
         let partner = memory.companion(context.briefing, CompanionRole::Partner);
         let was_seen = partner.is_some_and(|p| p.frame + LOST_FRAMES > memory.frame);
-        let follows = self.options.follows_partner && was_seen;
+        let follows = self.options.follows_partner && was_seen && !self.search.has_failed();
         if follows && valid.contains(&Plan::FollowPartner) {
             return Plan::FollowPartner;
         }
@@ -334,6 +369,8 @@ impl Policy for InferPolicy {
             belief.observe(briefing, memory, behavior);
         }
         let partner = memory.companion(briefing, CompanionRole::Partner);
+        self.search.observe(memory, partner);
+        self.rules.note_child(briefing, memory);
         if let Some(person) = partner.filter(|p| p.is_in_view) {
             let position = to_xz(person.position_in_world);
             self.builder.observe_partner(memory, position);

@@ -18,6 +18,7 @@ pub struct RulePolicy {
     has_looked_around: bool,
     last_look_around: Frame,
     last_choice: Frame,
+    /// Frame since which the helper has stood beside the child that ran away.
     beside_child: Option<Frame>,
 }
 
@@ -105,10 +106,6 @@ impl RulePolicy {
         let guardian = memory.companion(context.briefing, CompanionRole::Partner);
         let child = memory.people.get(child);
         let people = memory.rules.people;
-        let is_beside = |c: &TrackedPerson| {
-            let apart_m = horizontal_distance(memory.pose.position, c.position_in_world);
-            c.is_in_view && apart_m < people.child_beside_m
-        };
         // The child turns back at its next decision; from then on it needs no company.
         let has_stood = |since: Frame| now > since + people.child_stand_frames;
         let is_overdue = |since: Frame| now >= since + people.child_return_frames;
@@ -117,14 +114,9 @@ impl RulePolicy {
         if self.beside_child.is_some_and(is_overdue) {
             self.beside_child = None;
         }
-        if let Some(c) = child {
-            let is_away = memory.child_is_away(context.briefing);
-            if is_away && is_beside(c) {
-                self.beside_child.get_or_insert(now);
-            }
-            if is_away && !is_trusted {
-                return Some(Plan::FollowChild);
-            }
+        self.note_child(context.briefing, memory);
+        if memory.child_is_away(context.briefing) && !is_trusted {
+            return Some(Plan::FollowChild);
         }
         let max_unseen_frames = memory.rules.child_unseen_frames;
         let is_unseen =
@@ -134,6 +126,18 @@ impl RulePolicy {
             self.last_look_around = now;
             Plan::TurnAround
         })
+    }
+
+    /// Notes the first frame beside a child that is away from its guardian.
+    pub(super) fn note_child(&mut self, briefing: &Briefing, memory: &Memory) {
+        let child = memory.companion(briefing, CompanionRole::Child);
+        let is_beside = |c: &TrackedPerson| {
+            let apart_m = horizontal_distance(memory.pose.position, c.position_in_world);
+            c.is_in_view && apart_m < memory.rules.people.child_beside_m
+        };
+        if memory.child_is_away(briefing) && child.is_some_and(is_beside) {
+            self.beside_child.get_or_insert(memory.frame);
+        }
     }
 
     /// Returns the needed targets among the valid plans for which there is time, best first.
@@ -243,6 +247,7 @@ impl Policy for RulePolicy {
             return !matches!(current, Plan::PutIn) && self.needs_child_care(context);
         }
         if matches!(current, Plan::FollowChild) {
+            self.note_child(context.briefing, context.memory);
             return false;
         }
         has_changed

@@ -23,7 +23,7 @@ pub struct TimeRules {
     #[serde(alias = "walk_factor")]
     pub path_time_factor: f32,
     /// Minimum time of a pick-up and a put-on together, frames. Ours: slightly less than the
-    /// world's minimum of 58 + 75, so that no feasible delivery is ruled out.
+    /// world's minimum of 58 + 76, so that no feasible delivery is ruled out.
     pub pick_and_put_frames: Frame,
 }
 
@@ -58,8 +58,9 @@ pub struct FailureRules {
     /// an object is ignored, so that the next attempt starts elsewhere.
     #[serde(alias = "bad_place_frames")]
     pub failed_position_frames: Frame,
-    /// Time for which an unreachable object is ignored, frames. Ours: as long as one exploration
-    /// plan may take, which may reveal a path.
+    /// Time for which an unreachable object is ignored, frames. Other goal places are preferred for
+    /// this time after a delivery that timed out or got stuck. Ours: as long as one exploration plan
+    /// may take, which may reveal a path.
     pub unreachable_frames: Frame,
     /// Time for which an object is ignored after a pick-up failed because another agent holds it,
     /// frames. Ours: about as long as a pick-up takes.

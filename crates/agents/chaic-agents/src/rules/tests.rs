@@ -277,11 +277,15 @@ fn a_failed_put_on_or_a_timeout_ends_the_delivery_and_the_place_is_ignored() {
         assert_eq!(progress == Progress::Failed, ends, "{progress:?}");
         assert_eq!(s.memory.goal_places().is_empty(), ends);
 
-        let (mut s, mut executor, _) = deliver(failed_goal_place_frames);
+        let (mut s, mut executor, place) = deliver(failed_goal_place_frames);
         s.memory.frame += s.memory.rules.plan_timeouts.interact_frames + 1;
         assert_eq!(s.continue_plan(&mut executor, Plan::Deliver), Progress::Failed);
         assert_eq!(s.memory.goal_places().is_empty(), ends);
-        s.memory.frame += failed_goal_place_frames;
+        // Without the rule, other places are preferred for a while.
+        let ignored_frames = failed_goal_place_frames.max(PAPER.failures.unreachable_frames);
+        let place = s.memory.objects.get(place).expect("seen");
+        assert_eq!(place.ignore_until, s.memory.frame + ignored_frames);
+        s.memory.frame += ignored_frames;
         assert_eq!(s.memory.goal_places().len(), 1);
     }
 }

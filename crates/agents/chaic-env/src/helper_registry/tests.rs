@@ -32,21 +32,25 @@ fn last_digest(episode: &Episode, partner: &str) -> Digest {
     Digest(env.world().digest())
 }
 
-/// The digests are those of `chaic eval --partner NAME` before habits were parameters.
+/// A change of these digests moves the scores of all runs with such partners, so the changelog must
+/// state it.
 #[test]
 fn named_partners_play_as_before() {
     let house = shortened("no_constraint/gen/12", 2600);
-    for (partner, expected) in [
-        ("farthest", "a1c6b99b2b1a083c"),
-        ("shuffled", "a1c6b99b2b1a083c"),
-        ("slow", "be05361d0d2002b0"),
-        ("no_containers", "1dc13bf257e0a4f8"),
-        ("habits:order=nearest", "8e8e63f1c0f1a5fb"),
-    ] {
-        assert_eq!(last_digest(&house, partner).to_string(), expected, "{partner}");
-    }
     let other_house = shortened("low_target/gen/13", 1800);
-    assert_eq!(last_digest(&other_house, "noisy").to_string(), "1feea362de5d7ea5");
+    let expected = [
+        ("farthest", "e4bc979a2a445900"),
+        ("shuffled", "e4bc979a2a445900"),
+        ("slow", "be05361d0d2002b0"),
+        ("no_containers", "6b29abc3be0c5387"),
+        ("habits:order=nearest", "d068cc4043791672"),
+        ("noisy", "b240a62ca8a2f452"),
+    ];
+    let found = expected.map(|(partner, _)| {
+        let episode = if partner == "noisy" { &other_house } else { &house };
+        (partner, last_digest(episode, partner).to_string())
+    });
+    assert_eq!(found, expected.map(|(partner, digest)| (partner, digest.to_owned())));
 }
 
 #[test]

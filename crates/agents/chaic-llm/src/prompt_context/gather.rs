@@ -136,6 +136,9 @@ pub(super) fn body(capability: &Capability) -> Body {
         kind: impaired(kind, Impairments::from_capability(capability)),
         reach: reach(capability),
         strength_kg: capability.strength_kg as u32,
+        n_hands: capability.hands.all().len(),
+        carries_containers: capability.carries_containers,
+        lifts_furniture: capability.lifts_furniture,
         walks_bicycle: capability.docking_frames > 0,
         uses_wheelchair: capability.gait == Gait::Roll,
     }

@@ -2,6 +2,7 @@
 
 mod common;
 
+mod behavior;
 mod faults;
 mod hidden;
 mod injection;

@@ -51,18 +51,21 @@ simulator = "server"
 seat = "helper"
 "#;
 
-/// Built-in helpers, `mine`, `broken`, which fails, `halted`, which the end of the server stops, and `slow`.
+/// Built-in helpers, `mine`, `broken`, which fails, `panics`, `halted`, which the end of the server stops, and `slow`.
 pub struct TestHelpers;
 
 impl HelperRegistry for TestHelpers {
     fn names(&self) -> Vec<String> {
-        let own = ["mine", "broken", "halted", "slow"].map(str::to_owned);
+        let own = ["mine", "broken", "panics", "halted", "slow"].map(str::to_owned);
         BuiltInHelpers.names().into_iter().chain(own).collect()
     }
 
     fn make(&self, name: &str, rules: PlannerRules) -> Option<Helper> {
         let outcome = match name {
             "mine" => return BuiltInHelpers.make("rhp", rules),
+            "panics" => {
+                return Some(Helper { agent: Box::new(PanickingAgent), grants: Grants::NONE });
+            }
             "broken" => Err(AgentError::Broken("no idea".to_owned())),
             "halted" => Err(AgentError::Halted("the server ends".to_owned())),
             "slow" => Ok(Action::TurnLeft),
@@ -92,6 +95,21 @@ impl Agent for TestAgent {
             thread::sleep(SLOW);
         }
         self.outcome.clone()
+    }
+}
+
+/// Agent with a bug.
+struct PanickingAgent;
+
+impl Agent for PanickingAgent {
+    fn sensors(&self) -> SensorConfig {
+        SensorConfig::NONE
+    }
+
+    fn reset(&mut self, _: &Briefing) {}
+
+    fn act(&mut self, _: &Observation) -> Result<Action, AgentError> {
+        panic!("a bug of this test")
     }
 }
 

@@ -370,6 +370,25 @@ fn a_helper_that_fails_ends_the_episode_and_the_researcher_learns_why() {
     assert!(problems.iter().any(|problem| problem.contains("no idea")), "{problems:?}");
 }
 
+/// The page repeats a request with a status from 500 on, and the same turn would fail again.
+#[test]
+fn a_simulator_that_panics_ends_the_episode_and_not_the_study() {
+    let panics = SIMULATED.replace("seat = \"helper\"", "helper = \"panics\"");
+    let folder = Folder::new(&panics);
+    let server = folder.server();
+    let client = server.client(1);
+    client.begin();
+    client.open(0);
+    let turn = json!({ "frames": 9, "view_px": SIDE_PX });
+    let answer = client.turn(0, 0, &turn);
+    assert_eq!((answer.status, answer.error().as_str()), (422, "the episode cannot go on"));
+    let problems = server.problems();
+    assert!(problems.len() == 1 && problems[0].contains("error of chaic"), "{problems:?}");
+    assert_eq!(client.turn(0, 0, &turn).status, 409, "it is closed");
+    let left = "{\"type\":\"trial_end\",\"trial\":0,\"outcome\":\"left\"}\n".to_owned();
+    assert_eq!(client.append(2, &[left]).stored(), 3);
+}
+
 #[test]
 fn a_server_without_a_helper_of_the_study_does_not_start() {
     let unknown = SIMULATED.replace("seat = \"helper\"", "helper = \"theirs\"");

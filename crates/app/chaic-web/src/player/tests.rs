@@ -78,6 +78,15 @@ fn a_frame_is_the_same_however_it_is_reached() {
 }
 
 #[test]
+fn the_value_of_a_goal_has_its_unit() {
+    for (id, unit) in [("moving_house/test/00", "kg"), ("shopping/test/00", "")] {
+        let (trace, episode) = played(id, "none", 10);
+        let player = ReplayPlayer::open(trace.as_bytes(), episode.as_bytes()).unwrap();
+        assert_eq!(player.info().unit, unit, "{id}");
+    }
+}
+
+#[test]
 fn an_altered_trace_is_shown_up_to_the_frame_that_differs() {
     let (trace, episode) = played("no_constraint/test/00", "random", 300);
     let line = trace.lines().skip(1).filter(|line| line.contains("\"turn_left\"")).nth(3).unwrap();

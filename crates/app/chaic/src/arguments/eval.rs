@@ -207,7 +207,8 @@ pub struct EndpointArguments {
     /// Name of the language model.
     #[arg(long, value_name = "NAME")]
     pub model: Option<String>,
-    /// Environment variable with the key; "" sends no key [default: OPENAI_API_KEY].
+    /// Environment variable with the key; "" sends no key [default: OPENAI_API_KEY, for Azure
+    /// AZURE_OPENAI_API_KEY, and none for this machine].
     #[arg(long, value_name = "NAME")]
     pub llm_key_env: Option<String>,
     /// Allow plain http to another machine. The network can then read prompts and key.

@@ -77,6 +77,22 @@ fn bundled_helpers_have_weights_with_a_digest() {
     }
 }
 
+/// Else each episode of the run would fail.
+#[test]
+fn bundled_helpers_with_a_policy_per_task_are_refused_in_other_tasks() {
+    let registry = bundled();
+    for name in ["rl_paper", "smart_help"] {
+        assert!(TaskId::paper().all(|task| registry.check_task(name, task).is_ok()), "{name}");
+        for task in TaskId::chaic() {
+            let problem = registry.check_task(name, task).unwrap_err();
+            assert_eq!(problem, format!("`{name}` has no policy for {task}; select other tasks"));
+        }
+    }
+    for name in ["cloned", "rhp", "none"] {
+        assert!(TaskId::all().all(|task| registry.check_task(name, task).is_ok()), "{name}");
+    }
+}
+
 #[test]
 fn the_recipes_of_bundled_weights_are_valid() {
     for recipe in

@@ -1,11 +1,12 @@
 //! Properties of a training folder: a training that is stopped or killed anywhere ends with the
-//! same files as an uninterrupted one. A failed start leaves nothing to resume. Only one process
+//! same files as an uninterrupted one. A refused start leaves nothing to resume. Only one process
 //! trains in a folder.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::{fs, io};
 
+use chaic_files::FileError;
 use chaic_nn::weights::{self, WeightsError};
 use chaic_nn::{AdamWConfig, Network, Pass};
 use chaic_training::bounds::{BoundTable, LEARNING_RATE, STEPS, integer};
@@ -19,6 +20,7 @@ use chaic_training::{
 use serde::{Deserialize, Serialize};
 
 mod configuration;
+mod failed_start;
 
 /// File in the folder that interrupts the next validation.
 const INTERRUPT: &str = "interrupt";
@@ -34,7 +36,7 @@ struct ToyConfig {
     learning_rate: f32,
     /// Step whose weights are not finite; 0 for none.
     breaks_at: u64,
-    /// 1 if preparation fails, else 0.
+    /// 1 if the collected data is refused, 2 if a file operation fails once, else 0.
     fails: u8,
     /// Digest of the input data; 0 without such data.
     input: u64,
@@ -73,7 +75,7 @@ impl<const HAS_SCORE: bool> Trainer for Toy<HAS_SCORE> {
         ("steps", STEPS),
         ("learning_rate", LEARNING_RATE),
         ("breaks_at", integer(0, 1000)),
-        ("fails", integer(0, 1)),
+        ("fails", integer(0, 2)),
         ("input", integer(0, 9)),
         ("a", integer(0, 1)),
         ("b", integer(0, 1)),
@@ -92,11 +94,14 @@ impl<const HAS_SCORE: bool> Trainer for Toy<HAS_SCORE> {
         _: &mut dyn FnMut(&str),
         stop: &AtomicBool,
     ) -> Result<Option<Toy<HAS_SCORE>>, TrainingError> {
-        if config.fails == 1 {
+        if config.fails > 0 && !folder.join("clips").exists() {
             fs::create_dir_all(folder.join("clips/train")).unwrap();
             fs::write(folder.join("clips/train/0"), "").unwrap();
             fs::write(folder.join("windows"), "").unwrap();
-            return Err(TrainingError::from_data(std::io::Error::other("no data")));
+            return Err(match config.fails {
+                1 => TrainingError::from_data(io::Error::other("no data")),
+                _ => FileError::context("write", folder)(io::Error::other("disk full")).into(),
+            });
         }
         let learner = Learner::new(&network(), 1, 2);
         let (config, folder) = (config.clone(), folder.to_owned());
@@ -381,37 +386,6 @@ fn a_second_process_in_a_folder_is_refused() {
     assert!(matches!(started, Err(TrainingError::Locked(_))));
     drop(run);
     resume(dir.path()).unwrap();
-}
-
-#[test]
-fn a_failed_start_leaves_nothing_to_resume() {
-    let dir = tempfile::tempdir().unwrap();
-    let (out, never) = (dir.path().join("out"), AtomicBool::new(false));
-    let other = dir.path().join("other");
-    fs::write(&other, "no weights").unwrap();
-    let valid = ToyConfig::default();
-    for (config, weights, word) in [
-        (ToyConfig { learning_rate: f32::NAN, ..valid.clone() }, None, "`learning_rate`"),
-        (ToyConfig { steps: u64::MAX, ..valid.clone() }, None, "can't be used"),
-        (valid.clone(), Some(dir.path().join("missing")), "missing"),
-        (valid.clone(), Some(other), "not a weights file"),
-        (ToyConfig { fails: 1, ..valid }, None, "no data"),
-    ] {
-        let started =
-            TrainingRun::<Toy>::start(&out, &config, weights.as_deref(), &mut |_| (), &never);
-        let error = started.err().unwrap().to_string();
-        assert!(error.contains(word) && !error.contains('\n'), "{error}");
-        assert!(!out.exists(), "{error}");
-        assert!(resume(&out).is_err());
-    }
-    // In a folder that existed before, only the lock file is left.
-    fs::create_dir(&out).unwrap();
-    let fails = ToyConfig { fails: 1, ..ToyConfig::default() };
-    assert!(TrainingRun::<Toy>::start(&out, &fails, None, &mut |_| (), &never).is_err());
-    let error = resume(&out).err().unwrap().to_string();
-    assert!(error.contains("out holds no training"), "{error}");
-    assert!(run_to_end(&mut start(&out, &ToyConfig::default()), &mut |_, _| ()));
-    assert!(resume(&out).is_ok(), "a finished training can be resumed and has no steps left");
 }
 
 #[test]

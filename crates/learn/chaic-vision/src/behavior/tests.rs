@@ -10,7 +10,7 @@ use chaic_core::observation::{HistoryFrame, Images};
 use chaic_core::rng::RngStream;
 use chaic_core::{Frame, Vec3};
 use chaic_training::conformance::{bounds_every_number, refuses_damaged_checkpoints};
-use chaic_training::{Checkpoint, Trainer as _, parse_config};
+use chaic_training::{Checkpoint, Trainer as _, TrainingError, parse_config};
 
 use super::Behavior;
 use super::clip::{CROPS, Clip, SLACK};
@@ -262,6 +262,28 @@ fn a_training_without_clips_is_refused() {
         let problem = refused.err().expect("no batch can be drawn").to_string();
         assert!(problem.contains("no clips"), "{problem}");
     }
+}
+
+#[test]
+fn clips_that_cannot_be_stored_are_a_failed_file_operation() {
+    let dir = tempfile::tempdir().unwrap();
+    // A file in place of the folder of clips.
+    std::fs::write(dir.path().join("clips"), "").unwrap();
+    let config = BehaviorTrainingConfig::default();
+    let trainer = BehaviorTrainer::new(&config, dir.path(), &mut |_| (), &NEVER_STOP);
+    // A training keeps the data that it has collected before such an error.
+    assert!(matches!(trainer, Err(TrainingError::File(_))));
+}
+
+#[test]
+fn a_training_that_has_diverged_has_no_finite_loss() {
+    let config =
+        BehaviorTrainingConfig { steps: 40, batch_size: 1, ..BehaviorTrainingConfig::default() };
+    let mut learner = BehaviorLearner::new(config, synthetic_clips());
+    assert!(learner.step().loss.is_finite());
+    let last = learner.learner.parameters.last_mut().unwrap();
+    *last = f32::NAN;
+    assert!(learner.step().loss.is_nan());
 }
 
 #[test]

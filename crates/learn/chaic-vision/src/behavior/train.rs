@@ -93,7 +93,7 @@ pub struct BehaviorLearner {
 /// Metrics of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BehaviorMetrics {
-    /// Mean cross entropy.
+    /// Mean cross entropy; NaN if a logit is not finite.
     pub loss: f64,
     /// Fraction of correctly classified clips.
     pub accuracy: f64,
@@ -183,9 +183,18 @@ impl BehaviorTrainer {
         validation: Vec<Clip>,
     ) -> Result<BehaviorTrainer, TrainingError> {
         if training.iter().all(|clip| clip.is_mixed) {
-            return Err(TrainingError::from_data(StoreError::Empty));
+            return Err(StoreError::Empty.into());
         }
         Ok(BehaviorTrainer { learner: BehaviorLearner::new(config, training), validation })
+    }
+}
+
+impl From<StoreError> for TrainingError {
+    fn from(error: StoreError) -> TrainingError {
+        match error {
+            StoreError::File(error) => error.into(),
+            error => TrainingError::from_data(error),
+        }
     }
 }
 
@@ -234,10 +243,8 @@ impl Trainer for BehaviorTrainer {
             };
             collect(&collector, &mut report_progress, stop)
         };
-        let validation = clips(DatasetSplit::Validation).map_err(TrainingError::from_data)?;
-        let Some(validation) = validation else { return Ok(None) };
-        let training = clips(DatasetSplit::Train).map_err(TrainingError::from_data)?;
-        let Some(training) = training else { return Ok(None) };
+        let Some(validation) = clips(DatasetSplit::Validation)? else { return Ok(None) };
+        let Some(training) = clips(DatasetSplit::Train)? else { return Ok(None) };
         BehaviorTrainer::with_clips(*config, training, validation).map(Some)
     }
 
@@ -331,6 +338,10 @@ fn loss(logits: &[f32], clips: &[&Clip], smoothing: f32, gradient: &mut [f32]) -
         let p: BehaviorScores = softmax(outputs);
         let target = clip.label.index();
         metrics.loss -= f64::from(scale * ln(p[target].max(1e-9)));
+        if !outputs.iter().all(|x| x.is_finite()) {
+            // Probabilities of such logits are finite and would hide a training that has diverged.
+            metrics.loss = f64::NAN;
+        }
         metrics.accuracy +=
             f64::from(scale) * f64::from(u8::from(p.iter().all(|x| *x <= p[target])));
         for (k, gradient) in gradient.iter_mut().enumerate() {

@@ -1,4 +1,4 @@
-//! Promise: a failed update leaves its world on the device as it was.
+//! Promise: a failed update leaves its world on the device as it was, and occupies no memory.
 
 use bytemuck::Zeroable as _;
 use chaic_core::AgentId;
@@ -8,6 +8,7 @@ use chaic_render::{Channels, View};
 use chaic_world::Rules;
 
 use super::*;
+use crate::records::{LightRecord, MaterialRecord};
 
 fn episode(id: &str) -> (World, Scene) {
     let episode = find_episode(id).expect("the episode is bundled");
@@ -35,18 +36,61 @@ fn set_max_buffer_size(gpu: &mut Gpu, bytes: u64) -> u64 {
     std::mem::replace(&mut context.limits.max_buffer_size, bytes)
 }
 
-#[test]
-fn a_failed_update_keeps_the_world() {
-    let mut gpu = match Gpu::new(Adapters::Any) {
-        Ok(gpu) => gpu,
+/// Opens a device; `None` without one, which skips the test.
+fn open_gpu() -> Option<Gpu> {
+    match Gpu::new(Adapters::Any) {
+        Ok(gpu) => Some(gpu),
         Err(error) => {
             // As in the integration tests: on continuous integration, a missing device is a failure.
             let in_ci = std::env::var("CI").is_ok_and(|v| v == "true" || v == "1");
             assert!(!in_ci, "{error}");
             eprintln!("SKIPPED: {error}");
-            return;
+            None
         }
-    };
+    }
+}
+
+/// Returns the first free vertex, lamp and ground cell.
+fn first_free(gpu: &mut Gpu) -> [u32; 3] {
+    let Gpu { context, meshes, lights, .. } = gpu;
+    let vertices = meshes.vertices.add(context, &[[0; 4]]).expect("a vertex fits");
+    let lamps = lights.lamps.add(context, &[[0.0; 4]]).expect("a lamp fits");
+    let cells = lights.cells.add(context, &[[0; 4]]).expect("a cell fits");
+    let first = [vertices.start, lamps.start, cells.start];
+    meshes.vertices.remove(vertices);
+    lights.lamps.remove(lamps);
+    lights.cells.remove(cells);
+    first
+}
+
+#[test]
+fn a_failed_upload_frees_its_ranges() {
+    let Some(mut gpu) = open_gpu() else { return };
+    let (world, scene) = episode("obstacle/train/04");
+    let before = first_free(&mut gpu);
+    let max_buffer_size = set_max_buffer_size(&mut gpu, 0);
+    let Gpu { context, lights, meshes, .. } = &mut gpu;
+    // The arrays that an upload reaches last have no space.
+    let all = vec![LightRecord::zeroed(); 1 << 8];
+    let filled_lights = lights.records.add(context, &all).expect("the lights fit");
+    let all = vec![MaterialRecord::zeroed(); 1 << 12];
+    let filled_materials = meshes.materials.add(context, &all).expect("the materials fit");
+    scene.with_shapes(world.state(), &postures(&world), |shapes| {
+        let object = (0..shapes.len()).find(|k| shapes.shape_id(*k).is_some());
+        let object = object.expect("the scene has objects");
+        assert!(lights.add(context, &shapes.lighting()).is_err(), "there is no space");
+        assert!(meshes.acquire(context, shapes, object, None).is_err(), "there is no space");
+    });
+    lights.records.remove(filled_lights);
+    meshes.materials.remove(filled_materials);
+    set_max_buffer_size(&mut gpu, max_buffer_size);
+    assert_eq!(first_free(&mut gpu), before);
+    gpu.add(&scene, &world).expect("the world fits on the device");
+}
+
+#[test]
+fn a_failed_update_keeps_the_world() {
+    let Some(mut gpu) = open_gpu() else { return };
     let (world, scene) = episode("obstacle/train/04");
     let (other, other_scene) = episode("shopping/train/01");
     let id = gpu.add(&scene, &world).expect("the world fits on the device");

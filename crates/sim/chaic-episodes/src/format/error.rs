@@ -92,6 +92,12 @@ impl EpisodeError {
             serde_json::error::Category::Eof => {
                 EpisodeError::Truncated { source_name, line: error.line(), column: error.column() }
             }
+            // JSON that is no object, or repeats a field.
+            serde_json::error::Category::Data => EpisodeError::Field {
+                source_name,
+                field: super::TOP_LEVEL.to_owned(),
+                problem: error.to_string(),
+            },
             _ => {
                 let (field, problem) = (field_of(), error.to_string());
                 EpisodeError::NotJson { source_name, field, problem }

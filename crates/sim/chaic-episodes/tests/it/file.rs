@@ -58,7 +58,13 @@ fn a_truncated_file_is_reported_as_truncated() {
 fn files_of_other_formats_are_refused() {
     assert!(matches!(error_of(b"\x89PNG"), EpisodeError::NotJson { .. }));
     assert!(matches!(error_of(b"[1, 2]"), EpisodeError::WrongFormat { .. }));
-    assert!(error_of(b"17").to_string().starts_with("some/file.json: top level: "));
+    for (bytes, problem) in [
+        ("17", "invalid type: integer `17`, expected an object with the fields of an episode"),
+        (r#"{"format": "chaic-episode", "format": "gltf"}"#, "duplicate field `format`"),
+    ] {
+        let message = error_of(bytes.as_bytes()).to_string();
+        assert!(message.starts_with(&format!("some/file.json: top level: {problem}")), "{message}");
+    }
     assert!(matches!(error_of(b"{}"), EpisodeError::WrongFormat { .. }));
     let other = br#"{"format": "gltf", "version": 2}"#;
     assert!(matches!(error_of(other), EpisodeError::WrongFormat { .. }));

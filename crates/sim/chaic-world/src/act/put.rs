@@ -190,10 +190,13 @@ impl World {
         let release = Phase::Release { hand, object, on: Some(place), at, set_down: false };
         vec![
             self.reset_arms(hand, at),
+            self.pause(),
             ActionStep::new(release, d.open_hand + d.max_fall_wait),
+            self.pause(),
             self.reach(hand, at),
             self.pause(),
             self.reach(hand, spot),
+            self.pause(),
         ]
     }
 
@@ -238,7 +241,7 @@ impl World {
         hand: Option<Hand>,
         object: EntityId,
         place: EntityId,
-    ) -> [ActionStep; 4] {
+    ) -> [ActionStep; 7] {
         let d = self.rules.durations;
         let mut to = self.free_spot_on(place, object, self.person(agent).pose.position, &[]);
         let [low, high] = self.capability(agent).put_range_m;
@@ -246,10 +249,13 @@ impl World {
         let at = self.drop_spot(agent, object);
         let release = Phase::Release { hand, object, on: None, at, set_down: false };
         [
+            self.pause(),
             ActionStep::new(release, d.open_hand + d.max_fall_wait),
+            self.pause(),
             self.reach(hand, at),
             self.pause(),
             ActionStep::new(Phase::Reach { hand, to, fails: true }, d.reach),
+            self.pause(),
         ]
     }
 

@@ -3,7 +3,7 @@
 
 use crate::common::*;
 use chaic_core::action::{Action, FailureReason, Hand, Outcome};
-use chaic_core::capability::Persona;
+use chaic_core::capability::{Capability, Persona};
 use chaic_core::{AgentId, ClassId, EntityId, ResolvedAction, TaskId, Vec2};
 use chaic_world::{EventKind, ObjectLocation, Opening, Room, RoomKind, World};
 
@@ -45,11 +45,29 @@ fn a_pick_up_within_reach_takes_57_frames_and_a_put_on_75_to_100() {
     assert_eq!(w.state().agents[0].hands, [None, Some(nth(1))]);
     let (outcome, frames) = run(&mut w, A, Action::PutOn { place: nth(0), hand: Hand::Right });
     assert_eq!(outcome, Outcome::Success);
-    assert!((75..=100).contains(&frames), "{frames} frames");
+    assert!((75 + 1..=100 + 1).contains(&frames), "{frames} frames");
     let apple = &w.state().objects[2];
     assert_eq!(apple.location, ObjectLocation::Resting { on: Some(nth(0)) });
     assert!((apple.position.y - top).abs() < 0.02, "it lies on the table");
     assert_eq!(apple.delivered, None, "a table is not a goal place");
+}
+
+#[test]
+fn a_put_on_takes_75_frames_without_the_fall_whether_it_succeeds_or_not() {
+    let too_low = fails(FailureReason::BeyondLimits);
+    for (put_range_m, expected) in [([0.0, 3.0], Outcome::Success), ([2.9, 3.0], too_low)] {
+        let table = thing("dining_table", at(0.0, 0.0, 0.0));
+        let apple = thing("apple", at(0.5, 0.0, 0.9));
+        let mut setup = hall(vec![table, apple], vec![person(Persona::Adult, 0.0, 0.8)]);
+        let adult = Persona::Adult.capability();
+        setup.people[0].capability = Some(Capability { put_range_m, ..adult });
+        let mut rules = chaic_world::Rules::paper();
+        rules.durations.max_fall_wait = 0;
+        let mut w = World::new(setup, rules).expect("valid");
+        assert_eq!(run(&mut w, A, pick(nth(1))).0, Outcome::Success);
+        let put = Action::PutOn { place: nth(0), hand: Hand::Right };
+        assert_eq!(run(&mut w, A, put), (expected, 75 + 1));
+    }
 }
 
 #[test]

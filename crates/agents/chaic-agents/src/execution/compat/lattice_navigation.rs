@@ -110,7 +110,7 @@ impl Navigator for LatticeNavigator {
             return NavigationStep::Arrived;
         }
         if is_blocked {
-            // Turn on the spot until another agent clears the path, or the plan times out.
+            // Turn in place until another agent clears the path, or the plan times out.
             return NavigationStep::Act(Action::TurnLeft);
         }
         let path = self.hysteresis.kept_path(memory).unwrap_or(path);

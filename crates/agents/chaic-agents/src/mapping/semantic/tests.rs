@@ -37,6 +37,33 @@ fn the_footprint_of_the_largest_object_is_complete() {
 }
 
 #[test]
+fn the_layout_changes_when_an_obstacle_is_held_and_when_that_time_has_passed() {
+    for (class, is_obstacle) in [("trashbin", true), ("apple", false)] {
+        let detection = seen(TrackId(30), class, [1.0, 0.0, 1.0], 0.3, 0.3);
+        let mut map = SemanticMap::default();
+        map.update(std::slice::from_ref(&detection), &[], 300, 1);
+        let mut before = map.layout_version();
+        let mut has_changed = |map: &SemanticMap| {
+            let previous = std::mem::replace(&mut before, map.layout_version());
+            map.layout_version() != previous
+        };
+        map.mark_held(TrackId(30), 50);
+        assert_eq!(has_changed(&map), is_obstacle, "{class} is held");
+        map.count_newly_available(10, 49);
+        assert!(!has_changed(&map));
+        map.count_newly_available(49, 60);
+        assert_eq!(has_changed(&map), is_obstacle, "{class} is no longer held");
+        // In a person's hands.
+        let hands = [detection.position_in_world];
+        map.update(std::slice::from_ref(&detection), &hands, 300, 61);
+        let is_held = map.get(TrackId(30)).expect("seen").held_until > 61;
+        assert_eq!(has_changed(&map), is_obstacle && is_held);
+        map.update(std::slice::from_ref(&detection), &[], 300, 62);
+        assert_eq!(has_changed(&map), is_obstacle && is_held);
+    }
+}
+
+#[test]
 fn known_points_leave_a_footprint_as_a_merge_does() {
     let bits =
         |list: &[Vec2]| list.iter().map(|p| [p.x.to_bits(), p.y.to_bits()]).collect::<Vec<_>>();

@@ -1,5 +1,6 @@
 //! The inferring helper in a toy room, with detections chosen by hand.
 
+use chaic_core::Outcome;
 use chaic_core::rng::RngStream;
 
 use super::*;
@@ -169,6 +170,16 @@ fn without_evidence_it_follows_a_visible_partner_and_explores_otherwise() {
     assert_eq!(episode.mode(), "watch");
     assert_eq!(episode.step(200, &fruit), Plan::FollowPartner, "seen 190 frames ago");
     assert_eq!(episode.step(210, &fruit), Plan::Explore, "lost");
+    // It turns where it saw the partner last, or far from there.
+    episode.memory.last = Some((Action::TurnLeft, Outcome::Success));
+    for (position, is_far) in [([1.0, -1.0], false), ([-2.0, -1.0], true)] {
+        episode.toy.stand(position, 0.0);
+        assert_eq!(episode.step(300, &with_partner), Plan::FollowPartner);
+        let plans: Vec<Plan> = (301..320).map(|frame| episode.step(frame, &fruit)).collect();
+        assert!(plans[..17].iter().all(|plan| *plan == Plan::FollowPartner), "{plans:?}");
+        let then = if is_far { Plan::FollowPartner } else { Plan::Explore };
+        assert_eq!(plans[17..], [then, then], "after 18 turns");
+    }
     assert_eq!(episode.policy.identified, None);
     let options = InferOptions { follows_partner: false, ..InferOptions::ALL };
     let mut episode = Episode::ready(options, house);

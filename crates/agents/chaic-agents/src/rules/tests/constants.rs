@@ -46,6 +46,21 @@ fn a_plan_ends_at_its_time_limit_and_its_object_is_ignored_for_a_while() {
 }
 
 #[test]
+fn a_plan_ends_at_the_eighth_bump_in_a_row() {
+    let mut s = Scenario::new(PAPER);
+    let (memory, briefing, apple) = memory_of("apple", PAPER);
+    (s.memory, s.briefing) = (memory, briefing);
+    s.memory.refresh();
+    s.memory.last = Some((Action::MoveForward, Outcome::Failure(FailureReason::Blocked)));
+    let plan = Plan::PickUp(subject("apple", apple.0));
+    let mut executor = Executor::new(&s.briefing, &PAPER);
+    executor.start_plan(s.memory.frame, &PAPER);
+    let n_bumps = (1..20).find(|_| s.continue_plan(&mut executor, plan) == Progress::Failed);
+    assert_eq!(n_bumps, Some(8));
+    assert!(!s.memory.objects.get(apple).expect("seen").is_available(s.memory.frame));
+}
+
+#[test]
 fn impossible_or_held_objects_are_ignored_for_the_time_in_the_rules() {
     let failures = PAPER.failures;
     let shorter = FailureRules { impossible_frames: 100, ..failures };

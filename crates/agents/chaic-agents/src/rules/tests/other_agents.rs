@@ -170,6 +170,22 @@ fn the_helper_stays_with_the_child_briefly_or_as_long_as_it_is_there() {
 }
 
 #[test]
+fn the_helper_leaves_after_the_time_beside_the_child_counted_from_its_arrival() {
+    let mut s = child_scenario(PlannerRules { initial_look_around: false, ..PAPER });
+    let mut rhp = RulePolicy::new(RuleProfile::RHP);
+    let decide = |rules: &mut RulePolicy, context: &Context<'_>| rules.decide(context, &[]);
+    observe_poses(&mut s, 100, pose(0.0, 8.0), pose(0.0, -6.0));
+    assert_eq!(s.evaluate_with(&mut rhp, decide), Plan::FollowChild);
+    // It arrives while the plan is executed.
+    observe_both(&mut s, 200);
+    s.evaluate_with(&mut rhp, |rules, context| {
+        assert!(!rules.reconsiders(context, &Plan::FollowChild, true));
+    });
+    observe_both(&mut s, 231);
+    assert_eq!(s.evaluate_with(&mut rhp, decide), Plan::Explore);
+}
+
+#[test]
 fn the_time_beside_the_child_starts_again_when_the_child_has_moved_away() {
     // It has just left the distance to keep at 2.1 m, and is away at 2.8 m.
     for (child_m, is_done) in [(2.1, true), (2.8, false)] {

@@ -224,7 +224,7 @@ def test_ctrl_c_stops_a_long_call_and_the_next_call_continues(episode):
     threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
     with pytest.raises(KeyboardInterrupt):
         stopped.advance()
-    assert 0 < stopped.frame < stopped.horizon
+    assert stopped.frame < stopped.horizon
     until = stopped.frame + 30
     assert stopped.advance(until) == whole.advance(until) == "stopped"
     assert stopped.digest() == whole.digest()

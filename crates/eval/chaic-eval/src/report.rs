@@ -10,10 +10,10 @@ mod write;
 pub use coverage::{coverage, untraced_failures, untraced_note};
 pub use figure::{drawn_interval, write_figure};
 pub use labels::{Labels, RecordedGrants, title};
+pub use tables::{MIN_ENVIRONMENTS, capitalized, interval, number, rounded, shown_interval};
 pub use tables::{
     additional, counts, diagnostics, intervals, main_result, pairs, resolutions, run_pairs, stuck,
 };
-pub use tables::{capitalized, interval, number, rounded, shown_interval};
 pub use text_table::TextTable;
 pub(crate) use write::UNKNOWN_ENVIRONMENTS;
 pub use write::{Report, csv_text, differing_files, write_files};

@@ -12,16 +12,15 @@ use chaic_eval::activity::ActivityTotals;
 use chaic_eval::examples::{Example, ExampleRole, examples, paired_runs};
 use chaic_eval::metrics::{Difference, Interval, Metric, Score, Scores};
 use chaic_eval::published::published;
-use chaic_eval::report::{Format, Labels, Report, number, rounded, shown_interval};
+use chaic_eval::report::{
+    Format, Labels, MIN_ENVIRONMENTS, Report, number, rounded, shown_interval,
+};
 use chaic_eval::run::RunFolder;
 use serde::Serialize;
 
 use crate::data_link;
 use crate::overview::{OverviewRow, overview};
 use crate::replays::PageReplay;
-
-/// Minimum number of environments of a stated interval, as in the tables of a report.
-const MIN_ENVIRONMENTS: usize = 3;
 
 /// Report of a run for people.
 #[derive(Clone, Debug, Serialize)]

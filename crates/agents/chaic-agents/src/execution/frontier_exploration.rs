@@ -397,8 +397,8 @@ mod tests {
         }
     }
 
-    /// Returns the memory of a known room in the west with a shadow of 0.75 by 0.75 m in its corner, and
-    /// a door to an unknown room in the east, for an agent at this position.
+    /// Returns the memory of an agent at this position. The room in the west is known, except for a
+    /// shadow of 0.75 by 0.75 m in its corner. A door leads to an unknown room in the east.
     fn shadow_and_door(exploration: Exploration, at: [f32; 2]) -> (Toy, Memory) {
         let toy = Toy::room(12.0, 6.0);
         let rules = crate::PlannerRules { exploration, ..crate::PlannerRules::paper() };

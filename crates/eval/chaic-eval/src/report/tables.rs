@@ -15,7 +15,7 @@ pub(super) const FAILED: &str = "*";
 /// Mark of a number that lacks episode runs; replaces the number if all are missing.
 pub(super) const MISSING: &str = "?";
 /// Minimum number of environments for an interval; with fewer, it covers the whole range of a rate.
-const MIN_ENVIRONMENTS: usize = 3;
+pub const MIN_ENVIRONMENTS: usize = 3;
 /// Number of tasks per table, as in the paper.
 const TASKS_PER_TABLE: usize = 4;
 

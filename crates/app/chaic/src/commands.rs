@@ -95,10 +95,10 @@ fn jobs(given: Option<u16>) -> usize {
 /// # Errors
 /// If the system refuses the threads.
 fn start_threads(jobs: usize) -> Result<()> {
-    use anyhow::Context as _;
     // More threads than jobs would only wait.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build_global();
-    pool.context("can't start threads")
+    // The text of this error has its cause.
+    pool.map_err(|error| anyhow::anyhow!("can't start threads: {error}"))
 }
 
 /// Returns an empty table with a header.

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, anyhow};
 
 use crate::exit;
 use crate::output::print_error;
@@ -20,6 +20,10 @@ pub fn stop_flag() -> Result<&'static AtomicBool> {
             std::process::exit(exit::INTERRUPTED.into());
         }
         print_error("stopping; press Ctrl-C again to stop at once");
+    })
+    .map_err(|error| match error {
+        ctrlc::Error::System(cause) => anyhow!(cause),
+        other => anyhow!(other),
     })
     .context("can't listen for Ctrl-C")?;
     Ok(&STOP)

@@ -46,3 +46,6 @@ pub mod helpers;
 mod loaded_policy;
 
 pub mod toy;
+
+#[cfg(test)]
+mod test_support;

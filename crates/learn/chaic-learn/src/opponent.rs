@@ -13,6 +13,7 @@ pub mod network;
 pub mod tracker;
 
 pub mod collect;
+mod episode_agents;
 pub mod report;
 pub mod train;
 

@@ -106,10 +106,9 @@ mod tests {
     use chaic_agents::memory::Memory;
     use chaic_agents::track::TrackId;
     use chaic_core::geom::Pose;
-    use chaic_core::observation::{Grants, SensorConfig};
-    use chaic_core::{AgentId, Observation, TaskId, Vec3};
-    use chaic_env::{AgentSlot, Env, EpisodeAgents, EpisodeConfig};
-    use chaic_episodes::find_episode;
+    use chaic_core::{AgentId, TaskId, Vec3};
+
+    use crate::test_support::start;
 
     fn subject(track: u32) -> Subject {
         Subject { track: TrackId(track), class: ClassId::named("apple") }
@@ -117,19 +116,6 @@ mod tests {
 
     fn pick_up(track: u32) -> Plan {
         Plan::PickUp(subject(track))
-    }
-
-    /// Returns the briefing and the first observation of a helper.
-    fn start(task: TaskId) -> (Briefing, Observation) {
-        let episode = find_episode(&format!("{task}/gen/40000001")).unwrap();
-        let sensors = SensorConfig { image_size: 32, ..SensorConfig::DEPTH_AND_IDS };
-        let helper = Some(AgentSlot::external(Grants::PLANNER, sensors));
-        let config =
-            EpisodeConfig { image_size: Some(32), ..EpisodeConfig::new(&episode, "learner") };
-        let mut env = Env::new(config, EpisodeAgents { helper, partner: None }).unwrap();
-        env.advance(None).unwrap();
-        let observation = env.observe(AgentId::HELPER).unwrap().clone();
-        (env.briefing(AgentId::HELPER), observation)
     }
 
     /// Asserts whether plans are reconsidered, given the frames since the last choice and whether the map

@@ -31,6 +31,7 @@ use rayon::prelude::*;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
 use serde::{Deserialize, Serialize};
 
+use super::episode_agents::EpisodeAgentKinds;
 use super::window::{N_CLASS, N_STATE, ObservationHistory};
 use super::{N_LIMITS, OpponentGoal, is_pickable, limits};
 use crate::candidate_scorer::CandidateSet;
@@ -146,8 +147,6 @@ impl WindowCollectionConfig {
 
 /// Maximum number of windows per goal and episode, for variety.
 const MAX_PER_EPISODE: usize = 40;
-/// One in this many episodes has a partner that pauses before each plan.
-const WAITING_SHARE: u32 = 4;
 /// Episodes between two checks of the number of windows.
 const ROUND_EPISODES: usize = 32;
 
@@ -242,8 +241,8 @@ fn windows_of_episode(
     let planner = RuleSet::PAPER.planner;
     let partner_plan: Arc<Mutex<Option<ReportedPlan>>> = Arc::default();
     let persona = setup.people.first().map_or(task.info().partner.persona, |p| p.persona);
-    // Partners that follow the rules never wait.
-    let policy: Box<dyn Policy> = if index % WAITING_SHARE == WAITING_SHARE - 1 {
+    let EpisodeAgentKinds { partner_waits, helper_is_random } = EpisodeAgentKinds::draw(seed);
+    let policy: Box<dyn Policy> = if partner_waits {
         Box::new(PartnerVariantPolicy::new(PartnerHabits::SLOW))
     } else {
         Box::new(partners::policy(persona, task.info().scene))
@@ -257,8 +256,7 @@ fn windows_of_episode(
     let truth = GroundTruth { partner_plan, limits: limits(&capability), episode: index };
     let grants = perception.grants(Grants { behavior: config.granted, ..Grants::PLANNER });
     let recording = Recording { perception, grants, truth, log: Arc::clone(&log) };
-    // The paper's windows come from a random helper; RHP stays closer to its partner.
-    let helper = if index.is_multiple_of(2) {
+    let helper = if helper_is_random {
         recording.into_helper(RandomPolicy::default())
     } else {
         recording.into_helper(RulePolicy::new(RuleProfile::RHP))

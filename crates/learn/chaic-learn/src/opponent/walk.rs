@@ -52,8 +52,8 @@ pub struct PartnerWalk {
     /// Objects that the partner has been near, or walked towards, without a wall between.
     noticed: BTreeSet<TrackId>,
     map: Option<WalkMap>,
-    /// Path costs from the start of the walk, on the map at their first use.
-    from_start: Option<CostField>,
+    /// Path costs from the start of the walk, and the version of the costs of the map that they are on.
+    from_start: Option<(CostField, u32)>,
 }
 
 impl PartnerWalk {
@@ -117,10 +117,12 @@ impl PartnerWalk {
         let mut wanted: Vec<usize> = cells.iter().map(|(_, cell)| *cell).collect();
         let from_here = CostField::until_final(costs, here, search, &wanted);
         wanted.push(here_cell);
-        let kept = self.from_start.take();
-        let is_known = |field: &CostField| wanted.iter().all(|cell| field.is_final(*cell));
-        let from_start = match kept.filter(is_known) {
-            Some(field) => field,
+        let version = costs.version();
+        let is_current = |(field, of_version): &(CostField, u32)| {
+            *of_version == version && wanted.iter().all(|cell| field.is_final(*cell))
+        };
+        let from_start = match self.from_start.take().filter(is_current) {
+            Some((field, _)) => field,
             None if start == here => from_here.clone(),
             None => CostField::until_final(costs, start, search, &wanted),
         };
@@ -139,7 +141,7 @@ impl PartnerWalk {
         };
         let destinations =
             cells.iter().filter_map(|(track, cell)| Some((*track, relation(*cell)?))).collect();
-        self.from_start = Some(from_start);
+        self.from_start = Some((from_start, version));
         Some(WalkPaths { walked_m, destinations })
     }
 }
@@ -232,4 +234,55 @@ pub(super) fn goal_places<'a>(
     briefing: &'a Briefing,
 ) -> impl Iterator<Item = &'a MappedObject> {
     memory.objects.iter().filter(|t| briefing.goal_places.contains(&t.class))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use chaic_agents::PlannerRules;
+    use chaic_agents::perception::Detection;
+    use chaic_core::{ClassId, TaskId, Vec3};
+
+    use crate::test_support::start;
+
+    /// Otherwise the features would depend on the frames at which the model was asked.
+    #[test]
+    fn both_ends_of_a_walk_are_on_the_present_map() {
+        let (briefing, _) = start(TaskId::LowTarget);
+        let mut memory = Memory::new(&briefing, PlannerRules::paper());
+        let grid = *memory.map.grid();
+        let walk_start = grid.center(grid.cell_at(briefing.bounds.center()).unwrap());
+        let [here, apple_at] = [0.5, 1.5].map(|m| walk_start + Vec2::new(m, 0.0));
+        let apple = Detection {
+            track: TrackId(1),
+            class: ClassId::named("apple"),
+            confidence: 1.0,
+            person: None,
+            pixel: [0, 0],
+            position_in_world: Vec3::new(apple_at.x, 0.5, apple_at.y),
+            bottom_m: 0.45,
+            top_m: 0.55,
+            n_pixels: 50,
+            footprint: vec![apple_at],
+        };
+        memory.objects.update(&[apple], &[], 0, 0);
+        let behavior = BehaviorLog::default();
+        let destination = |walk: &mut PartnerWalk, memory: &Memory| {
+            let paths = walk.paths(memory, resting_objects(memory)).unwrap();
+            paths.destination(memory.objects.get(TrackId(1)).unwrap()).unwrap()
+        };
+        let mut asked_early = PartnerWalk::default();
+        asked_early.observe(&memory, &behavior, Some(walk_start));
+        let mut asked_late = asked_early.clone();
+        let first = destination(&mut asked_early, &memory);
+        // The helper bumps into something at the start of the walk.
+        memory.frame = 10;
+        memory.map.record_bump(walk_start, memory.frame, 1000);
+        let [early, late] = [&mut asked_early, &mut asked_late].map(|walk| {
+            walk.observe(&memory, &behavior, Some(here));
+            destination(walk, &memory)
+        });
+        assert_eq!(early, late);
+        assert!(late.initial_m > first.initial_m, "{first:?} {late:?}");
+    }
 }

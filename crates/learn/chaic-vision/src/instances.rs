@@ -354,6 +354,7 @@ impl Pixels {
             |segment, part| config.is_same_object(half_extents, segment, part),
         );
         segments.retain(|segment| segment.pixels.len() >= config.min_pixels);
+        segments.truncate(MAX_SEGMENTS);
         for segment in &mut segments {
             segment.score = self.mean_probability(&segment.pixels);
         }
@@ -408,6 +409,10 @@ impl Pixels {
         masks
     }
 }
+
+/// Maximum number of segments of an image; the largest ones count. Masks number them with 16 bits,
+/// and images of 2,048 pixels have room for more.
+const MAX_SEGMENTS: usize = u16::MAX as usize - 1;
 
 /// Returns the label with the largest sum of probabilities; the lowest one wins ties.
 fn majority_label(pixels: &[Pixel], part: &[u32]) -> u8 {

@@ -56,7 +56,8 @@ impl Ground {
         let all = all.expanded(0.5);
         let size = all.size();
         let max_cells = MAX_CELLS as f32 - 1.0;
-        let cells_per_m = (max_cells / size.x.max(size.y)).clamp(0.2, 25.0);
+        // Large enough for floors as far apart as coordinates permit.
+        let cells_per_m = (max_cells / size.x.max(size.y)).clamp(0.1, 25.0);
         let count = |m: f32| ((m * cells_per_m) as usize).min(MAX_CELLS - 1) + 1;
         let (nx, nz) = (count(size.x), count(size.y));
         let height = setup.ceiling_m.unwrap_or(3.0);
@@ -195,5 +196,31 @@ impl Ground {
             }
         }
         [x0, z0, x1, z1]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use chaic_test_kit::scenes::{empty, floor};
+    use chaic_world::{FloorMaterial, Room};
+
+    #[test]
+    fn the_ground_covers_floors_of_any_permitted_size() {
+        for max_m in [20.0, 600.0, 640.0, Setup::MAX_COORDINATE_M] {
+            let mut setup = empty();
+            setup.ceiling_m = Some(2.8);
+            setup.floors =
+                vec![floor([-max_m; 2], [max_m; 2], FloorMaterial::Wood, [190, 160, 120])];
+            let room = |from: f32, to: f32| Room {
+                kind: RoomKind::Office,
+                rect: Rect::new([from * max_m; 2], [to * max_m; 2]),
+            };
+            setup.rooms = vec![room(0.3, 0.5), room(0.8, 0.95)];
+            let ground = Ground::new(&setup);
+            assert!(ground.nx.max(ground.nz) <= MAX_CELLS);
+            let rooms = [0.4, 0.9].map(|at| ground.room_at(Vec3::new(at * max_m, 0.0, at * max_m)));
+            assert_eq!(rooms, [0, 1], "{max_m} m");
+        }
     }
 }

@@ -12,7 +12,7 @@ use glam::Mat3;
 use crate::texture::{Texture, linear_from_display};
 
 /// Material of a group of triangles.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Material {
     /// Linear color, 0 to 1.
     pub color: [f32; 3],
@@ -88,6 +88,8 @@ pub(crate) struct Mesh {
     /// First triangle of the face of each triangle: the two halves of a planar quad are one face.
     pub faces: Vec<u16>,
     pub materials: Vec<Material>,
+    /// Index of the material of the next triangle.
+    material: u8,
     pub min: Vec3,
     pub max: Vec3,
 }
@@ -164,11 +166,18 @@ const PLANAR_COSINE: f32 = 0.999_97;
 impl Mesh {
     /// Maximum number of vertices: indices have 16 bits.
     const MAX_VERTICES: usize = 65_000;
+    /// Maximum number of materials: indices have 8 bits.
+    const MAX_MATERIALS: usize = 255;
 
-    /// Begins a new material for the triangles that follow.
+    /// Begins a new material for the triangles that follow. In a full list, an equal material is
+    /// used again, as in long walls with many windows; without one, the current material stays.
     pub fn set_material(&mut self, material: Material) {
-        if self.materials.len() < 255 {
+        let n = self.materials.len();
+        if n < Mesh::MAX_MATERIALS {
             self.materials.push(material);
+            self.material = n as u8;
+        } else if let Some(k) = self.materials.iter().position(|m| *m == material) {
+            self.material = k as u8;
         }
     }
 
@@ -200,7 +209,7 @@ impl Mesh {
         if !fits || self.triangles.len() >= Mesh::MAX_VERTICES {
             return;
         }
-        let material = self.materials.len().saturating_sub(1) as u8;
+        let material = self.material;
         let vertices = vertices.map(|c| c as u16);
         self.faces.push(self.triangles.len() as u16);
         self.triangles.push(Triangle { vertices, material, smooth });
@@ -283,5 +292,47 @@ impl Mesh {
             ],
             n,
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_full_list_of_materials_is_used_again() {
+        let color = |k: usize| Material::new([(k % 100) as u8, 0, 0], Finish::Matte);
+        let mut mesh = Mesh::default();
+        for x in [0.0, 1.0, 2.0] {
+            mesh.vertex(Vec3::new(x, x * x, 0.0), Vec3::Y);
+        }
+        for k in 0..10 * Mesh::MAX_MATERIALS {
+            mesh.set_material(color(k));
+            mesh.triangle([0, 1, 2], false);
+        }
+        assert_eq!(mesh.materials.len(), Mesh::MAX_MATERIALS);
+        for (k, triangle) in mesh.triangles.iter().enumerate() {
+            assert_eq!(mesh.materials[usize::from(triangle.material)], color(k), "{k}");
+        }
+    }
+
+    #[test]
+    fn triangles_beyond_the_limits_are_left_out() {
+        let mut mesh = Mesh::default();
+        for k in 0..=1 << 16 {
+            mesh.vertex(Vec3::splat(k as f32), Vec3::Y);
+        }
+        let last = Mesh::MAX_VERTICES - 1;
+        for vertex in [last, last + 1, 1 << 16] {
+            mesh.triangle([0, 1, vertex], false);
+        }
+        let vertices: Vec<[u16; 3]> = mesh.triangles.iter().map(|t| t.vertices).collect();
+        assert_eq!(vertices, [[0, 1, last as u16]]);
+        for _ in 0..Mesh::MAX_VERTICES + 10 {
+            mesh.quad([0, 1, 2, 3], false);
+        }
+        assert_eq!(mesh.triangles.len(), Mesh::MAX_VERTICES);
+        assert!(mesh.faces.iter().enumerate().all(|(k, face)| usize::from(*face) <= k));
+        assert!(mesh.indices.iter().all(|list| list.len() == Mesh::MAX_VERTICES));
     }
 }

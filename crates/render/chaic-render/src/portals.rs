@@ -326,7 +326,7 @@ mod tests {
     use crate::{Channels, Scene, View};
     use chaic_core::rng::RngStream;
     use chaic_test_kit::hostile::{self, Case};
-    use chaic_test_kit::scenes::{camera, empty, house, wall, world};
+    use chaic_test_kit::scenes::{camera, empty, house, object, wall, world};
     use chaic_world::{Room, RoomKind, Wall};
     use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -464,5 +464,100 @@ mod tests {
             assert!(with == without, "seed {seed}: portal culling changed an image");
         }
         assert!(n_with_portals > 30, "{n_with_portals} plans have portals");
+    }
+
+    /// `n_x` by `n_z` rooms of 1.2 m with two doorways to each neighbor, and an apple in each room.
+    fn maze(n_x: usize, n_z: usize) -> Setup {
+        const SIDE_M: f32 = 1.2;
+        let mut setup = empty();
+        let end = [SIDE_M * n_x as f32, SIDE_M * n_z as f32];
+        setup.bounds = Rect::new([0.0; 2], end);
+        setup.ceiling_m = Some(2.8);
+        setup.walls = vec![
+            wall([0.0, 0.0], [end[0], 0.0]),
+            wall([end[0], 0.0], end),
+            wall(end, [0.0, end[1]]),
+            wall([0.0, end[1]], [0.0, 0.0]),
+        ];
+        for k in 0..n_x * n_z {
+            let (x, z) = (SIDE_M * (k % n_x) as f32, SIDE_M * (k / n_x) as f32);
+            let rect = Rect::new([x, z], [x + SIDE_M, z + SIDE_M]);
+            setup.rooms.push(Room { kind: RoomKind::Office, rect });
+            setup.things.push(object("apple", x + 0.5 * SIDE_M, z + 0.3 * SIDE_M, 0.0));
+            // The box of a wall is longer by half of its thickness at each end.
+            for [from, to] in [[0.0, 0.2], [0.5, 0.7], [1.0, 1.2]] {
+                if k % n_x > 0 {
+                    setup.walls.push(wall([x, z + from], [x, z + to]));
+                }
+                if k / n_x > 0 {
+                    setup.walls.push(wall([x + from, z], [x + to, z]));
+                }
+            }
+        }
+        setup
+    }
+
+    #[test]
+    fn plans_with_more_regions_than_bits_share_the_last_one() {
+        // With the outdoors, 64 regions, 65, and far more.
+        for (n_x, n_z) in [(9, 7), (8, 8), (10, 9)] {
+            let setup = maze(n_x, n_z);
+            let scene = Scene::new(&setup);
+            let portals = scene.portal_graph();
+            assert!(!portals.portals.is_empty() && portals.portals.len() <= MAX_PORTALS);
+            let center = |k: usize| setup.rooms[k].rect.center();
+            let regions = |k: usize| regions_at(portals, center(k).x, center(k).y);
+            let n = setup.rooms.len();
+            for k in 0..n {
+                assert_eq!(regions(k).bits(), 1 << k.min(MAX_REGIONS - 1), "room {k} of {n}");
+            }
+            assert_eq!(regions_at(portals, -0.15, 1.0).bits(), 1 << (MAX_REGIONS - 1));
+            // A yaw of 90 degrees looks away from all other rooms.
+            let eye = |k: usize| [center(k).x, 1.5, center(k).y];
+            let away = visible_from(portals, eye(0), FRAC_PI_2);
+            assert!(away.may_show(regions(0), None) && !away.may_show(regions(n - 1), None));
+            let world = world(setup.clone());
+            let view = |(k, yaw_rad): (usize, f32)| {
+                let camera = camera(eye(k), yaw_rad, -0.4, 60, 45);
+                View::from_camera(camera, Channels::DEPTH_AND_IDS)
+            };
+            let views: Vec<View> =
+                [0, n / 2, n - 1].into_iter().zip([-FRAC_PI_2, 0.4, 2.0]).map(view).collect();
+            let with = scene.render(&world, &views);
+            let without = Scene::new(&setup).without_portals().render(&world, &views);
+            assert!(with == without, "{n} rooms: portal culling changed an image");
+        }
+    }
+
+    /// Six rooms side by side with a row of `n` pillars between two neighbors.
+    fn colonnades(n: usize) -> Setup {
+        let mut setup = empty();
+        let end = [6.0, 24.0];
+        setup.bounds = Rect::new([0.0; 2], end);
+        setup.ceiling_m = Some(2.8);
+        setup.walls = vec![
+            wall([0.0, 0.0], [end[0], 0.0]),
+            wall([end[0], 0.0], end),
+            wall(end, [0.0, end[1]]),
+            wall([0.0, end[1]], [0.0, 0.0]),
+        ];
+        for x in [0.0, 1.0, 2.0, 3.0, 4.0, 5.0] {
+            let rect = Rect::new([x, 0.0], [x + 1.0, end[1]]);
+            setup.rooms.push(Room { kind: RoomKind::Office, rect });
+            for z in (0..n).map(|k| 0.2 * k as f32 + 0.1).filter(|_| x > 0.0) {
+                setup.walls.push(wall([x, z], [x, z + 0.01]));
+            }
+        }
+        setup
+    }
+
+    #[test]
+    fn plans_with_too_many_portals_have_none() {
+        let portals = PortalGraph::new(&colonnades(95)).portals;
+        assert!((MAX_PORTALS - 100..=MAX_PORTALS).contains(&portals.len()), "{}", portals.len());
+        // Slightly above the maximum, and as many as the grid resolves.
+        for n in [104, 119] {
+            assert_eq!(PortalGraph::new(&colonnades(n)), PortalGraph::default(), "{n} pillars");
+        }
     }
 }

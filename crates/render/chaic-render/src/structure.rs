@@ -6,8 +6,8 @@
 
 use chaic_core::catalogue::Finish;
 use chaic_core::geom::Rect;
-use chaic_core::{EntityId, Vec3};
-use chaic_world::{FloorMaterial, Room, RoomKind, Setup};
+use chaic_core::{AgentId, EntityId, Vec3};
+use chaic_world::{FloorMaterial, Room, RoomKind, Setup, subtract_rect};
 use glam::Mat3;
 
 use crate::mesh::{self, Material, Mesh};
@@ -22,8 +22,9 @@ pub(crate) use wall_frame::WallFrame;
 /// Meshes of the building in the world frame.
 pub(crate) fn meshes(setup: &Setup) -> Vec<(EntityId, Mesh)> {
     let mut structure = Vec::new();
-    for (rect, material, color) in floor_pieces(setup) {
-        structure.push((EntityId::FLOOR, floor_mesh(&rect, material, color)));
+    // Without a split, which only a setup that no world accepts may prevent, floors overlap.
+    for floor in setup.floor_pieces().unwrap_or_else(|| setup.floors.clone()) {
+        structure.push((EntityId::FLOOR, floor_mesh(&floor.rect, floor.material, floor.color)));
     }
     let wall_materials = walls::wall_materials(setup);
     for wall in &setup.walls {
@@ -49,23 +50,21 @@ fn indoors(setup: &Setup) -> impl Iterator<Item = &Room> {
     setup.rooms.iter().filter(|r| r.kind != RoomKind::Outdoors)
 }
 
-/// Maximum number of pieces of floor or ceiling; it limits the work on invalid input.
+/// Maximum number of pieces of ceiling, frames or lamps; it limits the work on invalid input.
 const MAX_PIECES: usize = 4096;
 
-/// Splits the floors into disjoint pieces: where two overlap, the later one covers the earlier.
-fn floor_pieces(setup: &Setup) -> Vec<(Rect, FloorMaterial, [u8; 3])> {
-    let mut pieces: Vec<(Rect, FloorMaterial, [u8; 3])> = Vec::new();
-    for floor in setup.floors.iter().take(MAX_PIECES) {
-        let mut remaining = Vec::new();
-        for (rect, material, color) in pieces.drain(..) {
-            subtract_rect(&rect, &floor.rect, |piece| remaining.push((piece, material, color)));
-        }
-        remaining.push((floor.rect, floor.material, floor.color));
-        remaining.truncate(MAX_PIECES);
-        pieces = remaining;
-    }
-    pieces
-}
+// Visibility ids name every instance of a setup that a world accepts: floors, walls, both parts of
+// door frames, ceilings in and between rooms, lamps, people and objects.
+const _: () = assert!(
+    Setup::MAX_FLOOR_PIECES
+        + Setup::MAX_WALLS
+        + 2 * Setup::MAX_OPENINGS
+        + (Setup::MAX_ROOMS + MAX_PIECES)
+        + Setup::MAX_ROOMS
+        + AgentId::MAX_AGENTS
+        + Setup::MAX_THINGS
+        < 0xffff
+);
 
 /// Ceilings of rooms, and of the area between them and the outermost walls: doorways and alcoves
 /// belong to no room.
@@ -88,24 +87,6 @@ fn ceiling_pieces(setup: &Setup) -> Vec<Rect> {
     // They overlap the ceilings of rooms by a millimeter, so that no pixel falls between them.
     pieces.extend(between.iter().map(|r| r.expanded(0.001)));
     pieces
-}
-
-/// Calls `keep` with the parts of `rect` outside of `hole`.
-fn subtract_rect(rect: &Rect, hole: &Rect, mut keep: impl FnMut(Rect)) {
-    let (low, high) = (rect.min.max(hole.min), rect.max.min(hole.max));
-    if low.x >= high.x || low.y >= high.y {
-        keep(*rect);
-        return;
-    }
-    let mut keep_some = |x0: f32, z0: f32, x1: f32, z1: f32| {
-        if x1 > x0 && z1 > z0 {
-            keep(Rect::new([x0, z0], [x1, z1]));
-        }
-    };
-    keep_some(rect.min.x, rect.min.y, low.x, rect.max.y);
-    keep_some(high.x, rect.min.y, rect.max.x, rect.max.y);
-    keep_some(low.x, rect.min.y, high.x, low.y);
-    keep_some(low.x, high.y, high.x, rect.max.y);
 }
 
 fn floor_mesh(rect: &Rect, floor_material: FloorMaterial, color: [u8; 3]) -> Mesh {

@@ -13,6 +13,7 @@
 //! - Besides the state, only the list of pending events changes. The other fields are the setup, the rules
 //!   and values derived from them.
 
+mod floors;
 mod setup;
 mod state;
 
@@ -38,6 +39,7 @@ mod view;
 mod world;
 
 pub use event::{Event, EventKind};
+pub use floors::subtract_rect;
 pub use posture::{Arm, Posture};
 pub use rules::{Blocking, Durations, JointLift, ReachTo, Rules};
 pub use setup::{

@@ -378,6 +378,11 @@ impl Setup {
         for (i, floor) in self.floors.iter().enumerate() {
             rect(format!("floors[{i}].rect"), &floor.rect)?;
         }
+        if self.floor_pieces().is_none() {
+            let max = Setup::MAX_FLOOR_PIECES;
+            let problem = format!("cut each other into more than {max} pieces");
+            return Err(SetupError::new("floors", problem));
+        }
         for (i, w) in self.walls.iter().enumerate() {
             for (name, v) in [("a", w.a), ("b", w.b)] {
                 check_range(format!("walls[{i}].{name}[0]"), v.x, -max, max)?;

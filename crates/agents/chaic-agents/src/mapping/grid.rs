@@ -8,8 +8,9 @@ use chaic_core::geom::math::floor_small;
 pub const CELL_M: f32 = 0.125;
 /// Margin of the grid beyond the bounds of the episode, meters.
 const MARGIN_M: f32 = 1.0;
-/// Maximum number of cells along one side: 128 m. A larger area is mapped only in part.
-const MAX_SIDE: usize = 1024;
+/// Maximum number of cells along one side, 203 m: an episode has at most 200 m, and there are two
+/// margins. A larger area is mapped only in part.
+pub(crate) const MAX_SIDE: usize = 1624;
 
 /// Grid of square cells over a part of the ground plane, row by row along x.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,7 +77,7 @@ impl Grid {
     /// Column and row of a cell.
     #[inline]
     pub fn column_row(&self, cell: usize) -> (usize, usize) {
-        // Divides in 32 bits, which takes half as long: there are 2^20 cells at most.
+        // Divides in 32 bits, which takes half as long: there are fewer than 2^22 cells.
         let (cell, nx) = (cell as u32, self.nx as u32);
         ((cell % nx) as usize, (cell / nx) as usize)
     }
@@ -191,5 +192,25 @@ mod tests {
             assert_eq!(visited, straight.map(|(next, _)| next).collect::<Vec<_>>());
         }
         assert_eq!(grid.disc(grid.center(100), 0.13).count(), 5);
+    }
+
+    #[test]
+    fn the_longest_episode_is_mapped_completely_and_larger_areas_in_part() {
+        for (length_m, is_complete) in [(126.5, true), (200.0, true), (205.0, false), (1e9, false)]
+        {
+            let bounds = Rect::new([-100.0; 2], [length_m - 100.0; 2]);
+            let grid = Grid::new(&bounds);
+            assert!(grid.nx() <= MAX_SIDE && grid.nz() <= MAX_SIDE, "{length_m} m");
+            assert_eq!(grid.cell_at(bounds.max).is_some(), is_complete, "{length_m} m");
+            assert!(grid.cell_at(bounds.min).is_some());
+            for p in [bounds.min, bounds.max, Vec2::new(99.9, 99.9), Vec2::new(-100.9, 99.9)] {
+                let cell = grid.cell_at(p).map_or(-1, |cell| cell as i32);
+                assert_eq!(grid.cell_or_none(p.x, p.y), cell, "{length_m} m: {p}");
+            }
+            let last = grid.n_cells() - 1;
+            assert_eq!(grid.column_row(last), (grid.nx() - 1, grid.nz() - 1));
+            assert_eq!(grid.cell_at(grid.center(last)), Some(last));
+            assert_eq!(grid.neighbors(last).count(), 3);
+        }
     }
 }

@@ -8,6 +8,7 @@ mod determinism;
 mod granted;
 mod impairments;
 mod joint_carry;
+mod limits;
 mod positions;
 mod random;
 mod supports;

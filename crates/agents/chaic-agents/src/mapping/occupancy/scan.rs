@@ -7,13 +7,14 @@ use super::{
     HEAD_MARGIN_M, MAP_RANGE_M, NOW_FLOOR, NOW_HIGH, NOW_NEAR, NOW_OCCUPIED, NOW_TALL,
     OccupancyMap, TALL_M, TOP_M, WALL_M,
 };
-use crate::mapping::grid::Grid;
+use crate::mapping::grid::{Grid, MAX_SIDE};
 use crate::perception::{Percepts, Rays};
 
 /// Points below this are floor, meters. (The paper's code uses 0.05; rugs and curbs need more.)
 const FLOOR_M: f32 = 0.08;
 /// A pixel's observation is encoded as its cell times this, plus `NOW_*` bits.
 const CELL_FACTOR: u32 = 32;
+const _: () = assert!(MAX_SIDE * MAX_SIDE < (u32::MAX / CELL_FACTOR) as usize);
 /// Number of pixels processed at once.
 const LANES: usize = 16;
 

@@ -278,6 +278,7 @@ def test_invalid_arguments_are_refused(tmp_path):
         (ValueError, lambda: chaic.evaluate({"a": Turner, "b": Rhp}, out=out, **OPTIONS)),
         (ValueError, lambda: chaic.evaluate(Turner, out=out, **{**OPTIONS, "tasks": "flying"})),
         (ValueError, lambda: chaic.evaluate(Turner, out=out, track="open", **OPTIONS)),
+        (ValueError, lambda: chaic.evaluate(baselines="smart_help", behavior="learned", out=out, **OPTIONS)),
         (ValueError, lambda: chaic.evaluate(Turner, out=out, rules="papr", **OPTIONS)),
         (ValueError, lambda: chaic.evaluate(Turner, out=out, set="nothing=1", **OPTIONS)),
         (ValueError, lambda: chaic.evaluate(Turner, out=out, episodes=tmp_path, **OPTIONS)),

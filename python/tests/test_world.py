@@ -168,6 +168,7 @@ def test_a_changed_episode_is_parsed_and_checked(episode):
         (ValueError, lambda e: chaic.World(e, helper="nobody")),
         (ValueError, lambda e: chaic.World(e, partner="nobody")),
         (ValueError, lambda e: chaic.World(e, helper="rhp", perception="crystal ball")),
+        (ValueError, lambda e: chaic.World(e, helper="smart_help", behavior="learned")),
         (ValueError, lambda e: chaic.PlanningAgent("rhp", behavior="crystal ball")),
         (RuntimeError, lambda e: chaic.Planner(perception="learned:missing.safetensors")),
         (ValueError, lambda e: chaic.World(e, grants=["gold"])),

@@ -95,6 +95,19 @@ pub enum LlmError {
         /// Expected path.
         path: PathBuf,
     },
+    /// A record would become larger than what can be read.
+    #[error(
+        "{path} can't grow beyond {max_mib} MiB, so the run stopped before the next entry; it can still \
+         be read; start another run with a smaller request.max_prompt_tokens or \
+         endpoint.max_answer_bytes",
+        path = path.display()
+    )]
+    RecordFull {
+        /// Path of the file.
+        path: PathBuf,
+        /// Maximum size, MiB.
+        max_mib: u64,
+    },
     /// A record is invalid.
     #[error("{path}: line {line}: {problem}", path = path.display())]
     Unreadable {

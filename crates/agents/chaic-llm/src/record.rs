@@ -20,8 +20,10 @@ use crate::exchange::{ChatRequest, DecisionRecord, Exchange};
 pub const FORMAT: &str = "chaic-llm";
 /// Version of the format.
 pub const VERSION: u32 = 1;
-/// Maximum size of a record, bytes: a hundred times a typical one.
-const MAX_RECORD_BYTES: u64 = 256 << 20;
+/// Maximum size of a record, MiB: a hundred times a typical one.
+const MAX_RECORD_MIB: u64 = 256;
+/// The same in bytes.
+const MAX_RECORD_BYTES: u64 = MAX_RECORD_MIB << 20;
 
 /// Returns the folder of a run's records.
 pub fn folder(run: &Path) -> PathBuf {
@@ -185,6 +187,8 @@ pub struct DecisionLogWriter {
     before: DecisionLog,
     /// Number of these entries that were reused.
     used: usize,
+    /// End of the last reused or written entry, bytes from the start of the file.
+    end: u64,
     /// True if the rest of the file must be truncated before a write.
     must_truncate: bool,
 }
@@ -220,7 +224,8 @@ impl DecisionLogWriter {
             ends: Vec::new(),
             header_end: first.len() as u64,
         });
-        Ok(DecisionLogWriter { path: path.to_owned(), file, before, used: 0, must_truncate: true })
+        let (path, end) = (path.to_owned(), before.header_end);
+        Ok(DecisionLogWriter { path, file, before, used: 0, end, must_truncate: true })
     }
 
     /// Returns the recorded exchange of this request, if the record has it at this position.
@@ -234,22 +239,29 @@ impl DecisionLogWriter {
     /// Appends an entry, unless the record has it at this position.
     ///
     /// # Errors
-    /// If the file cannot be written.
+    /// If the file cannot be written, or would become larger than what [`DecisionLog::read`] reads.
+    /// A refused entry leaves the file as it is.
     pub fn push(&mut self, entry: RecordEntry) -> Result<()> {
         if self.before.entries.get(self.used) == Some(&entry) {
+            self.end = self.before.ends[self.used];
             self.used += 1;
             return Ok(());
         }
+        let line = entry.to_line();
+        let end = self.end + line.len() as u64;
+        if end > MAX_RECORD_BYTES {
+            return Err(LlmError::RecordFull { path: self.path.clone(), max_mib: MAX_RECORD_MIB });
+        }
         let refused = || LlmError::io("write", &self.path);
         if std::mem::take(&mut self.must_truncate) {
-            let end = self.used.checked_sub(1).and_then(|k| self.before.ends.get(k));
-            let end = end.copied().unwrap_or(self.before.header_end);
-            self.file.set_len(end).map_err(refused())?;
-            self.file.seek(SeekFrom::Start(end)).map_err(refused())?;
+            self.file.set_len(self.end).map_err(refused())?;
+            self.file.seek(SeekFrom::Start(self.end)).map_err(refused())?;
             self.before.entries.truncate(self.used);
         }
-        let written = self.file.write_all(entry.to_line().as_bytes());
-        written.and_then(|()| self.file.sync_data()).map_err(refused())
+        let written = self.file.write_all(line.as_bytes());
+        written.and_then(|()| self.file.sync_data()).map_err(refused())?;
+        self.end = end;
+        Ok(())
     }
 }
 
@@ -385,6 +397,32 @@ mod tests {
         fs::write(&path, whole.replacen("one", "0ne", 1)).unwrap();
         let error = DecisionLog::read(dir.path(), &path).unwrap_err().to_string();
         assert!(error.contains("line 2") && error.contains("request differs"), "{error}");
+    }
+
+    #[test]
+    fn a_record_never_grows_beyond_what_can_be_read() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("r.jsonl");
+        let entries = || DecisionLog::read(dir.path(), &path).unwrap().entries;
+        write(&path, &[exchange("one"), exchange("two")]);
+        let mut recorder = DecisionLogWriter::open(dir.path(), &path, &header()).unwrap();
+        let start = recorder.end;
+        recorder.push(exchange("one")).unwrap();
+        assert_eq!(recorder.end - start, exchange("one").to_line().len() as u64);
+        // As if the record were almost full.
+        let end = recorder.end;
+        recorder.end = MAX_RECORD_BYTES + 1 - decided(1).to_line().len() as u64;
+        let error = recorder.push(decided(1)).unwrap_err().to_string();
+        assert!(error.contains("r.jsonl can't grow beyond 256 MiB"), "{error}");
+        assert!(!error.contains('\n'), "{error}");
+        assert_eq!(entries(), [exchange("one"), exchange("two")], "the file is unchanged");
+        recorder.end = end;
+        recorder.push(decided(1)).unwrap();
+        recorder.end = MAX_RECORD_BYTES - decided(2).to_line().len() as u64;
+        recorder.push(decided(2)).unwrap();
+        assert_eq!(recorder.end, MAX_RECORD_BYTES);
+        assert!(recorder.push(decided(3)).is_err());
+        assert_eq!(entries(), [exchange("one"), decided(1), decided(2)]);
     }
 
     #[test]

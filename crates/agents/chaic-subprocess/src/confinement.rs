@@ -13,7 +13,7 @@ pub struct ConfinementOptions {
     pub is_trusted: bool,
     /// Files and folders that commands can read in addition to system folders and paths in their lines.
     pub readable: Vec<PathBuf>,
-    /// Folders that stay empty for commands, such as that of the run.
+    /// Folders and files that appear empty to commands, such as the folder of the run.
     pub masked: Vec<PathBuf>,
 }
 

@@ -107,6 +107,10 @@ impl HelperRegistry for PyHelperRegistry<'_> {
         };
         Some(Helper { agent, grants: self.grants })
     }
+
+    fn fallback(&self) -> Option<&dyn HelperRegistry> {
+        Some(&self.built_in)
+    }
 }
 
 /// Options of a run from Python.

@@ -158,6 +158,7 @@ impl Options {
                 let perception = Arc::clone(&self.perception);
                 let built_in = BuiltInWithPerception { perception: Arc::clone(&perception) };
                 let helpers = PolicyRegistry::bundled(&built_in, perception);
+                helpers.check_perception(name).map_err(mistake)?;
                 let found = helper_registry::find(&helpers, name, self.rules.planner);
                 found.map_err(|error| from_env(&error))?.map(AgentSlot::from)
             }

@@ -13,8 +13,9 @@ pub struct Policy {
     pub start_folder: PathBuf,
     /// Readable files and folders outside the system folders, at the same paths.
     pub readable: Vec<PathBuf>,
-    /// Folders that appear empty to the command even inside readable ones. Without namespaces,
-    /// Landlock refuses access to them, and to lists of the readable folders that contain them.
+    /// Folders and files that appear empty to the command even inside readable folders. Without
+    /// namespaces, Landlock refuses access to them, and to lists of the readable folders that contain
+    /// them.
     pub masked: Vec<PathBuf>,
     /// Memory of all processes, MiB: anonymous and shared pages.
     pub memory_mib: u64,

@@ -48,7 +48,6 @@ pub struct EnvSpeed {
     /// Side of the helpers' images, pixels.
     pub size: u32,
     /// Side of the partners' images, pixels.
-    #[serde(rename = "minds_size")]
     pub partner_size: u32,
     /// Channels of the helpers' images, for example `rgb+depth`.
     pub channels: String,
@@ -208,6 +207,8 @@ mod tests {
         let speed =
             bench.measure(&mut |fraction| fractions.push(fraction)).expect("bundled episodes");
         assert!(speed.steps >= 8 && speed.frames > 0, "{speed:?}");
+        let json = serde_json::to_value(&speed).expect("its keys are strings");
+        assert_eq!(json["partner_size"], 32, "{json}");
         assert_eq!(fractions.last(), Some(&1.0));
     }
 }

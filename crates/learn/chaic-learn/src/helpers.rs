@@ -162,6 +162,23 @@ impl<'a> PolicyRegistry<'a> {
         let given = self.given(name).map(|p| &p.policy);
         given.or_else(|| BundledHelper::find(name).map(BundledHelper::policy))
     }
+
+    /// Checks that a helper's opponent model, if it has one, gets the inputs on which it was trained.
+    ///
+    /// # Errors
+    /// One line, if the perception withholds the partner's actions that the model needs.
+    pub fn check_perception(&self, name: &str) -> Result<(), String> {
+        let opponent = self.policy(name).and_then(LoadedPolicy::opponent);
+        if opponent.is_none_or(|model| model.fits(&*self.perception)) {
+            return Ok(());
+        }
+        let file = self.given(name).map(|given| format!(" ({})", given.path.display()));
+        Err(format!(
+            "`{name}`{} has an opponent model that was trained with the grant `behavior`, which learned \
+             behavior replaces; select behavior `gt` (`--behavior gt`), or leave the helper out",
+            file.unwrap_or_default()
+        ))
+    }
 }
 
 impl HelperRegistry for PolicyRegistry<'_> {
@@ -189,6 +206,7 @@ impl HelperRegistry for PolicyRegistry<'_> {
         let Some(policy) = self.policy(name) else {
             return self.fallback.check_task(name, task);
         };
+        self.check_perception(name)?;
         if policy.plays(task) {
             return Ok(());
         }

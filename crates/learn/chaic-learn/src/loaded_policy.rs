@@ -8,6 +8,7 @@ use chaic_core::TaskId;
 use chaic_env::helper_registry::Helper;
 use chaic_nn::weights::{self, WeightsError};
 
+use crate::opponent::network::OpponentModel;
 use crate::policy::{ActionSelection, LearnedPolicy, policy_helper};
 use crate::policy_kind::PolicyWeights;
 use crate::visual::helper::{VisualHelper, VisualPolicies, VisualWeights};
@@ -36,6 +37,14 @@ impl LoadedPolicy {
         match self {
             LoadedPolicy::Plans(_) => true,
             LoadedPolicy::Visual(policies) => policies.plays(task),
+        }
+    }
+
+    /// Returns its opponent model, if it has one.
+    pub(crate) fn opponent(&self) -> Option<Arc<OpponentModel>> {
+        match self {
+            LoadedPolicy::Plans(weights) => weights.opponent.clone(),
+            LoadedPolicy::Visual(policies) => policies.opponent(),
         }
     }
 

@@ -160,8 +160,8 @@ impl RolloutConfig {
         }
         let perception = self.perception_factory().map_err(|e| e.to_string())?;
         perception.check_image_size(self.image_size)?;
-        self.read_opponent().map_err(|e| e.to_string())?;
-        Ok(())
+        let opponent = self.read_opponent().map_err(|e| e.to_string())?;
+        check_opponent("rollout.", opponent.as_ref(), &*perception)
     }
 
     pub(crate) fn read_opponent(&self) -> Result<Option<OpponentModel>, TrainingError> {
@@ -260,6 +260,23 @@ pub(crate) fn read_opponent(path: Option<&Path>) -> Result<Option<OpponentModel>
         OpponentModel::from_bytes(&read_user_file(path, MAX_BYTES)?).map_err(weights_error)
     };
     path.map(parse).transpose()
+}
+
+/// Checks that an opponent model gets the inputs on which it was trained. `table` precedes the keys.
+///
+/// # Errors
+/// One line that names the keys.
+pub(crate) fn check_opponent(
+    table: &str,
+    opponent: Option<&OpponentModel>,
+    perception: &dyn PerceptionFactory,
+) -> Result<(), String> {
+    if opponent.is_none_or(|model| model.fits(perception)) {
+        return Ok(());
+    }
+    Err(format!(
+        "`{table}opponent` was trained with the grant `behavior`, so it needs `{table}behavior = \"gt\"`"
+    ))
 }
 
 /// Checks the names of generators under a key of a configuration.

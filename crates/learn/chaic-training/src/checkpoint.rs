@@ -164,9 +164,19 @@ impl Checkpoint {
     /// # Errors
     /// [`CheckpointError::Section`] if there is no such section.
     pub fn integers(&self, name: &str, n: usize) -> Result<&[u64], CheckpointError> {
+        match self.all_integers(name)? {
+            values if values.len() == n => Ok(values),
+            values => Err(wrong_length(name, values.len(), n)),
+        }
+    }
+
+    /// Returns a section of any number of integers.
+    ///
+    /// # Errors
+    /// [`CheckpointError::Section`] if there is no such section.
+    pub fn all_integers(&self, name: &str) -> Result<&[u64], CheckpointError> {
         match self.sections.get(name) {
-            Some(Section::Integers(values)) if values.len() == n => Ok(values),
-            Some(Section::Integers(values)) => Err(wrong_length(name, values.len(), n)),
+            Some(Section::Integers(values)) => Ok(values),
             other => Err(not_a_section(name, "integers", other)),
         }
     }

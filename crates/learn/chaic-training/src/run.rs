@@ -313,9 +313,7 @@ impl<T: Trainer> TrainingRun<T> {
     ) -> Result<bool, TrainingError> {
         let Some(metrics) = self.trainer.step(stop)? else { return Ok(false) };
         let step = self.steps_done();
-        if !metrics.values().all(|x| x.is_finite()) {
-            return Err(TrainingError::NonFiniteMetric(step));
-        }
+        check_finite(&metrics, step)?;
         self.pending_metrics.push(metrics);
         let is_last = step == self.trainer.total_steps();
         if step.is_multiple_of(T::RECORD_STEPS) || is_last {
@@ -339,6 +337,7 @@ impl<T: Trainer> TrainingRun<T> {
             |problem: WeightsError| TrainingError::NotFinite { step, problem: problem.to_string() };
         let validated = self.trainer.validate(stop).map_err(not_finite)?;
         let Some((metrics, weights)) = validated else { return Ok(false) };
+        check_finite(&metrics, step)?;
         let score = T::SCORE.and_then(|name| metrics.get(name).copied());
         let is_best = score.is_none_or(|score| self.best_score.is_none_or(|best| score > best));
         if is_best {
@@ -373,6 +372,12 @@ impl<T: Trainer> TrainingRun<T> {
         report(record);
         Ok(())
     }
+}
+
+/// Checks that metrics are finite. Undefined ones are left out of [`Metrics`].
+fn check_finite(metrics: &Metrics, step: u64) -> Result<(), TrainingError> {
+    let is_finite = metrics.values().all(|x| x.is_finite());
+    is_finite.then_some(()).ok_or(TrainingError::NonFiniteMetric(step))
 }
 
 /// Content of a weights file with its parsed parameters.

@@ -187,7 +187,7 @@ pub enum TrainingError {
         /// Name of the tensor and the problem.
         problem: String,
     },
-    /// A training metric is not finite; holds the step.
+    /// A metric of a step or of its validation is not finite; holds the step.
     #[error(
         "a metric of step {0} is not finite; the last checkpoint is kept, resume it with a lower learning rate"
     )]

@@ -33,6 +33,8 @@ const OLD: &str = "/old";
 const NEW: &str = "/new";
 /// Private file system whose folders are bound into the new root.
 const SCRATCH: &str = "/scratch";
+/// Empty file that hides masked files.
+const EMPTY: &str = "/empty";
 /// Maximum number of files and folders that a command can create.
 const MAX_FILES: u32 = 100_000;
 
@@ -46,6 +48,7 @@ pub(super) fn build(policy: &Policy) -> SetupResult<Vec<PathBuf>> {
         make_folder(Path::new(&format!("{BASE}{folder}")))?;
     }
     enter(BASE, &format!("{BASE}{OLD}"))?;
+    fs::write(EMPTY, "").map_err(SetupError::context(format!("write {EMPTY}")))?;
     mount_tmpfs(NEW, "mode=0755,size=4m")?;
     let options = format!("mode=0700,size={}m,nr_inodes={MAX_FILES}", policy.scratch_mib);
     mount_tmpfs(SCRATCH, &options)?;
@@ -185,14 +188,20 @@ impl Root {
         Ok(())
     }
 
-    /// Hides a folder inside a readable one.
+    /// Hides the content of a folder or file inside a readable folder. A path that the new root lacks
+    /// needs no mask.
     fn mask(&mut self, path: &Path) -> SetupResult<()> {
-        let target = under(NEW, path);
-        let is_private = self.writable.iter().any(|w| path == w);
-        if is_private || !target.is_dir() {
-            return Ok(());
+        // A mount through a link would follow it in the root of the construction.
+        let path = resolve_in(NEW, path);
+        let target = under(NEW, &path);
+        let is_private = self.writable.contains(&path);
+        match fs::symlink_metadata(&target) {
+            Ok(kind) if kind.is_dir() && !is_private => {
+                mount_tmpfs(&target.to_string_lossy(), "mode=0555,size=4k")
+            }
+            Ok(kind) if !kind.is_dir() && !kind.is_symlink() => bind(Path::new(EMPTY), &target),
+            _ => Ok(()),
         }
-        mount_tmpfs(&target.to_string_lossy(), "mode=0555,size=4k")
     }
 
     fn bind(&mut self, from: &Path, to: &Path) -> SetupResult<()> {

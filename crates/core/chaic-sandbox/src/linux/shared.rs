@@ -11,8 +11,8 @@ const MAX_ENTRIES: usize = 10_000;
 
 /// Returns the access to the readable paths of a policy and to a private folder.
 ///
-/// Landlock cannot except a folder below a readable one. So the other entries of a folder that
-/// contains a masked one are readable, each by itself. The command cannot list such a folder.
+/// Landlock cannot except a path below a readable folder. So the other entries of a folder that
+/// contains a masked path are readable, each by itself. The command cannot list such a folder.
 pub(super) fn access(policy: &Policy, scratch: PathBuf) -> Access {
     let masked: Vec<PathBuf> = policy.masked.iter().map(|path| resolve(path)).collect();
     let system = SYSTEM_FOLDERS.iter().chain(SYSTEM_FILES).map(Path::new);
@@ -30,7 +30,7 @@ fn resolve(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }
 
-/// Adds a path without links. If it contains a masked folder, adds its other entries instead.
+/// Adds a path without links. If it contains a masked one, adds its other entries instead.
 fn add_unmasked(path: PathBuf, masked: &[PathBuf], read: &mut Vec<PathBuf>) {
     if masked.iter().any(|folder| path.starts_with(folder)) {
         return;
@@ -100,6 +100,8 @@ mod tests {
         ] {
             assert_eq!(readable(&top, folder, masked), entries, "{folder}, {masked}");
         }
+        let others = [Path::new("data/run"), Path::new("data/runs")];
+        assert_eq!(readable(&top, "data", "data/weights"), others, "a file is masked too");
         let above = readable(&top, ".", "data/run");
         assert_eq!(above, [entries[0], entries[1], Path::new("other")]);
     }

@@ -70,6 +70,11 @@ pub const ATTACKS: &[Attack] = &[
     // Secrets of the caller.
     word("read-run-folder", "read the run's files", "if has(RUN + '/secret'): success()"),
     word(
+        "read-masked-file",
+        "read a hidden file in a readable folder",
+        "if has(READABLE + '/answers'): success()",
+    ),
+    word(
         "read-through-link",
         "read the run's files through a link in the own folder",
         "os.symlink(RUN + '/secret', 'link')\nif has('link'): success()",

@@ -144,7 +144,7 @@ impl Target {
         for folder in ["run", "start", "readable", "home"] {
             fs::create_dir(at(folder)).expect("there is room");
         }
-        for file in ["run/secret", "home/notes"] {
+        for file in ["run/secret", "home/notes", "readable/answers"] {
             fs::write(at(file), &secret).expect("there is room");
         }
         fs::write(at("readable/program.py"), "print(1)").expect("there is room");
@@ -161,7 +161,7 @@ impl Target {
         let mut policy = Policy {
             start_folder: at("start"),
             readable: vec![at("readable")],
-            masked: vec![at("run")],
+            masked: vec![at("run"), at("readable/answers")],
             memory_mib: 192,
             scratch_mib: 48,
             max_tasks: 64,

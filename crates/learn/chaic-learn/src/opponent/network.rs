@@ -1,6 +1,8 @@
 //! Network of the opponent model.
 
+use chaic_agents::perception_factory::PerceptionFactory;
 use chaic_core::geom::math;
+use chaic_core::observation::Grants;
 use chaic_nn::Pass;
 use chaic_nn::weights::{self, WeightsError};
 
@@ -119,6 +121,13 @@ impl OpponentModel {
     /// True if the model was trained with the partner's actions granted, and needs them.
     pub fn is_granted(&self) -> bool {
         self.is_granted
+    }
+
+    /// Returns whether helpers with this perception have the grant that the model needs, if any.
+    /// Learned behavior recognition replaces the granted actions.
+    pub fn fits(&self, perception: &dyn PerceptionFactory) -> bool {
+        let requested = Grants { behavior: self.is_granted, ..Grants::PLANNER };
+        perception.grants(requested).behavior || !self.is_granted
     }
 
     /// Parses a weights file.

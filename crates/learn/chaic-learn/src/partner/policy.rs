@@ -55,7 +55,7 @@ impl PartnerWeights {
     }
 }
 
-/// Chooses a partner's plans by a network. Choices are due as for the rules.
+/// Chooses a partner's plans by a network. Choices are due as for a rule-based partner.
 #[derive(Clone)]
 pub struct LearnedPartnerPolicy {
     weights: Arc<PartnerWeights>,
@@ -101,8 +101,10 @@ impl Policy for LearnedPartnerPolicy {
     }
 
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, has_changed: bool) -> bool {
-        let interval = context.memory.rules.time.replan_interval_frames;
+        let rules = context.memory.rules;
+        let interval = rules.time.replan_interval_frames;
         let is_due = match current {
+            _ if !rules.replans => false,
             Plan::Deliver | Plan::PutIn | Plan::LiftWith(_) | Plan::TurnAround => false,
             _ => has_changed || context.memory.frame >= self.encoder.last_frame() + interval,
         };
@@ -116,5 +118,46 @@ impl Policy for LearnedPartnerPolicy {
 
     fn fork(&self) -> Option<LearnedPartnerPolicy> {
         Some(self.clone())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use chaic_agents::behavior::BehaviorLog;
+    use chaic_agents::memory::Memory;
+    use chaic_core::AgentId;
+    use chaic_env::{Env, EpisodeAgents, EpisodeConfig};
+    use chaic_episodes::find_episode;
+
+    #[test]
+    fn an_unfinished_plan_is_reconsidered_if_the_rules_replan() {
+        let episode = find_episode("low_target/gen/40000001").unwrap();
+        let config = EpisodeConfig::new(&episode, "none");
+        let env = Env::new(config, EpisodeAgents::new(None, None)).unwrap();
+        let briefing = env.briefing(AgentId::PARTNER);
+        let model = partner_network();
+        let parameters = model.network.init_parameters(1);
+        let weights = Arc::new(PartnerWeights { model, parameters, digest: String::new() });
+        let behavior = BehaviorLog::default();
+        for replans in [true, false] {
+            let rules = PlannerRules { replans, ..PlannerRules::paper() };
+            let mut memory = Memory::new(&briefing, rules);
+            let mut policy =
+                LearnedPartnerPolicy::new(Arc::clone(&weights), ActionSelection::Greedy);
+            for (plan, frame, has_changed, is_due) in [
+                (Plan::Explore, 39, false, false),
+                (Plan::Explore, 39, true, replans),
+                (Plan::Explore, 40, false, replans),
+                (Plan::Deliver, 40, true, false),
+            ] {
+                memory.frame = frame;
+                let (briefing, memory) = (&briefing, &memory);
+                let context = Context { briefing, memory, behavior: &behavior, is_explored: false };
+                let found = policy.reconsiders(&context, &plan, has_changed);
+                assert_eq!(found, is_due, "{plan:?} at {frame}, {has_changed}, {replans}");
+                assert_eq!(policy.encoder.reconsidered(), is_due.then_some(plan));
+            }
+        }
     }
 }

@@ -90,7 +90,7 @@ impl VisualPolicies {
     }
 
     /// Returns the opponent model of one of the policies; all need the same grants.
-    fn opponent(&self) -> Option<Arc<OpponentModel>> {
+    pub(crate) fn opponent(&self) -> Option<Arc<OpponentModel>> {
         let any = match self {
             VisualPolicies::AllTasks(weights) => Some(weights),
             VisualPolicies::ByTask(policies) => policies.first().map(|(_, weights)| weights),

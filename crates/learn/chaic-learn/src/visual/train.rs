@@ -22,7 +22,7 @@ use crate::opponent::network::OpponentInput;
 use crate::ppo::{Schedule, ppo_bounds, update};
 use crate::rollout::{RolloutEpisode, RolloutError};
 use crate::rollout_config::{
-    MAX_VALIDATION_EPISODES, REWARD, Validation, check_splits, mean, read_opponent,
+    MAX_VALIDATION_EPISODES, REWARD, Validation, check_opponent, check_splits, mean, read_opponent,
     validation_episodes,
 };
 use crate::train::read_reference;
@@ -127,7 +127,7 @@ impl Trainer for VisualTrainer {
             return Err("`tasks` is empty".to_owned());
         }
         check_splits("splits", &config.splits)?;
-        read_opponent(config.opponent.as_deref()).map_err(|e| e.to_string())?;
+        let opponent = read_opponent(config.opponent.as_deref()).map_err(|e| e.to_string())?;
         let image_px = image_size as usize;
         if !image_px.is_multiple_of(IMAGE_SIZE) {
             return Err(format!("`image_size` must be a multiple of {IMAGE_SIZE}, up to 1024"));
@@ -142,7 +142,8 @@ impl Trainer for VisualTrainer {
                 "`n_envs` times `n_steps` must be from 1 to {MAX_DECISIONS} to fit in memory"
             ));
         }
-        config.perception_factory().map(|_| ()).map_err(|e| e.to_string())
+        let perception = config.perception_factory().map_err(|e| e.to_string())?;
+        check_opponent("", opponent.as_ref(), &*perception)
     }
 
     fn read_weights(config: &VisualConfig, weights: &[u8]) -> Result<Vec<f32>, WeightsError> {
@@ -292,7 +293,15 @@ fn read_progress(
     updates: u64,
     checkpoint: &Checkpoint,
 ) -> Result<Vec<EpisodeProgress>, CheckpointError> {
-    let episode_counts = checkpoint.integers(EPISODES, config.n_envs)?;
+    let episode_counts = checkpoint.all_integers(EPISODES)?;
+    if episode_counts.len() != config.n_envs {
+        return Err(CheckpointError::Data(format!(
+            "`n_envs` is {}, but was {} when the training began; set it back in config.toml, or start a \
+             new training",
+            config.n_envs,
+            episode_counts.len()
+        )));
+    }
     let n_actions = checkpoint.integers(N_ACTIONS, config.n_envs)?;
     let n_total = usize::try_from(n_actions.iter().fold(0, |sum: u64, n| sum.saturating_add(*n)));
     let n_total = n_total.map_err(|_| CheckpointError::section(N_ACTIONS, "is too large"))?;
@@ -315,4 +324,27 @@ fn read_progress(
         actions: indices.by_ref().take(*n as usize).map(|index| *index as u16).collect(),
     };
     Ok(episode_counts.iter().zip(n_actions).map(progress_of).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_training_is_resumed_with_as_many_environments_as_before() {
+        let mut checkpoint = Checkpoint::default();
+        checkpoint.insert_integers(EPISODES, vec![0, 1]);
+        checkpoint.insert_integers(N_ACTIONS, vec![1, 0]);
+        checkpoint.insert_integers(ACTION_INDICES, vec![3]);
+        let read = |n_envs| {
+            let config = VisualConfig { n_envs, ..VisualConfig::default() };
+            read_progress(&config, 1, &checkpoint).map(|progress| progress.len())
+        };
+        assert_eq!(read(2), Ok(2));
+        for n_envs in [1, 3] {
+            let problem = read(n_envs).unwrap_err().to_string();
+            let expected = format!("`n_envs` is {n_envs}, but was 2 when the training began");
+            assert!(problem.contains(&expected) && !problem.contains('\n'), "{problem}");
+        }
+    }
 }

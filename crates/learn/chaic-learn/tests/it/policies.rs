@@ -26,6 +26,7 @@ use chaic_learn::visual::network::VisualNetwork;
 use chaic_learn::visual::train::VisualTrainer;
 use chaic_nn::weights;
 use chaic_training::parse_config;
+use chaic_vision::perception_registry::perception_from_name;
 
 fn bundled() -> PolicyRegistry<'static> {
     PolicyRegistry::bundled(&BuiltInHelpers, Arc::new(GroundTruthPerceptionFactory))
@@ -90,6 +91,35 @@ fn bundled_helpers_with_a_policy_per_task_are_refused_in_other_tasks() {
     }
     for name in ["cloned", "rhp", "none"] {
         assert!(TaskId::all().all(|task| registry.check_task(name, task).is_ok()), "{name}");
+    }
+}
+
+/// Else its opponent model would read inputs on which it was not trained.
+#[test]
+fn a_policy_with_granted_behavior_is_refused_with_learned_behavior() {
+    let folder = tempfile::tempdir().unwrap();
+    for (behavior, is_refused) in [("gt", false), ("learned", true)] {
+        let inputs = [("mine", OpponentInput::Granted), ("other", OpponentInput::Observed)];
+        let policies = inputs.map(|(name, opponent)| {
+            let file = folder.path().join(format!("{name}.safetensors"));
+            write_visual_policy(&file, opponent, 1);
+            NamedPolicy::read(name, &file).unwrap()
+        });
+        let perception = perception_from_name("gt", behavior).unwrap();
+        let registry = PolicyRegistry::bundled(&BuiltInHelpers, perception);
+        let registry = registry.with_policies(policies.into()).unwrap();
+        for name in ["other", "cloned", "smart_help_plus", "rhp", "none"] {
+            assert_eq!(registry.check_task(name, TaskId::Obstacle), Ok(()), "{name}");
+        }
+        for name in ["mine", "smart_help"] {
+            let checked = registry.check_task(name, TaskId::Obstacle);
+            assert_eq!(checked.is_err(), is_refused, "{name}");
+            let Err(problem) = checked else { continue };
+            let words = ["the grant `behavior`", "`--behavior gt`"];
+            assert!(words.iter().all(|word| problem.contains(word)), "{problem}");
+            assert!(problem.starts_with(&format!("`{name}`")), "{problem}");
+            assert_eq!(problem.contains("mine.safetensors)"), name == "mine", "{problem}");
+        }
     }
 }
 

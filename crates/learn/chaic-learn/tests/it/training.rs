@@ -371,6 +371,26 @@ fn write_opponent(file: &Path) -> Vec<f32> {
     parameters
 }
 
+/// Else the opponent model would read inputs on which it was not trained.
+#[test]
+fn trainings_with_a_granted_opponent_model_need_granted_behavior() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("opponent.safetensors");
+    write_opponent(&file);
+    for (behavior, is_refused) in [("gt", false), ("learned", true)] {
+        let keys = format!("opponent = {file:?}\nbehavior = {behavior:?}");
+        let in_rollout = format!("[rollout]\n{keys}");
+        for (problem, table) in [
+            (parse_config::<VisualTrainer>(&keys).err(), ""),
+            (parse_config::<PolicyTrainer<CloningConfig>>(&in_rollout).err(), "rollout."),
+        ] {
+            assert_eq!(problem.is_some(), is_refused, "{problem:?}");
+            let expected = format!("needs `{table}behavior = \"gt\"`");
+            assert!(problem.is_none_or(|problem| problem.contains(&expected)), "{expected}");
+        }
+    }
+}
+
 #[test]
 fn interrupted_visual_trainings_end_with_the_same_bits() {
     for action_space in ActionSpace::ALL {

@@ -220,7 +220,10 @@ def test_a_world_in_use_by_another_thread_raises(episode):
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no signals of this kind")
-def test_ctrl_c_stops_a_long_call_and_the_next_call_continues(episode):
+def test_ctrl_c_stops_a_long_call_and_the_next_call_continues(episode, request):
+    # Programs that shells start in the background ignore this signal.
+    handler = signal.signal(signal.SIGINT, signal.default_int_handler)
+    request.addfinalizer(lambda: signal.signal(signal.SIGINT, handler))
     stopped, whole = (chaic.World(episode, helper="rhp") for _ in range(2))
     threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
     with pytest.raises(KeyboardInterrupt):

@@ -466,11 +466,9 @@ mod tests {
         assert!(n_with_portals > 30, "{n_with_portals} plans have portals");
     }
 
-    /// `n_x` by `n_z` rooms of 1.2 m with two doorways to each neighbor, and an apple in each room.
-    fn maze(n_x: usize, n_z: usize) -> Setup {
-        const SIDE_M: f32 = 1.2;
+    /// A house with four outer walls and no room.
+    fn enclosed(end: [f32; 2]) -> Setup {
         let mut setup = empty();
-        let end = [SIDE_M * n_x as f32, SIDE_M * n_z as f32];
         setup.bounds = Rect::new([0.0; 2], end);
         setup.ceiling_m = Some(2.8);
         setup.walls = vec![
@@ -479,6 +477,13 @@ mod tests {
             wall(end, [0.0, end[1]]),
             wall([0.0, end[1]], [0.0, 0.0]),
         ];
+        setup
+    }
+
+    /// `n_x` by `n_z` rooms of 1.2 m with two doorways to each neighbor, and an apple in each room.
+    fn maze(n_x: usize, n_z: usize) -> Setup {
+        const SIDE_M: f32 = 1.2;
+        let mut setup = enclosed([SIDE_M * n_x as f32, SIDE_M * n_z as f32]);
         for k in 0..n_x * n_z {
             let (x, z) = (SIDE_M * (k % n_x) as f32, SIDE_M * (k / n_x) as f32);
             let rect = Rect::new([x, z], [x + SIDE_M, z + SIDE_M]);
@@ -531,16 +536,8 @@ mod tests {
 
     /// Six rooms side by side with a row of `n` pillars between two neighbors.
     fn colonnades(n: usize) -> Setup {
-        let mut setup = empty();
         let end = [6.0, 24.0];
-        setup.bounds = Rect::new([0.0; 2], end);
-        setup.ceiling_m = Some(2.8);
-        setup.walls = vec![
-            wall([0.0, 0.0], [end[0], 0.0]),
-            wall([end[0], 0.0], end),
-            wall(end, [0.0, end[1]]),
-            wall([0.0, end[1]], [0.0, 0.0]),
-        ];
+        let mut setup = enclosed(end);
         for x in [0.0, 1.0, 2.0, 3.0, 4.0, 5.0] {
             let rect = Rect::new([x, 0.0], [x + 1.0, end[1]]);
             setup.rooms.push(Room { kind: RoomKind::Office, rect });

@@ -7,6 +7,7 @@ for ``action_space.sample``: the actions that the hands allow, or the offered pl
 
 from __future__ import annotations
 
+import math
 import operator
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from chaic import _deprecated, spaces
 from chaic._chaic import ACTIONS, REWARD, Planner, World, weigh_reward
+from chaic._recreated import Recreated
 from chaic.episodes import EpisodeSource
 
 #: Agent id of the helper in a world.
@@ -31,7 +33,10 @@ Info = dict[str, Any]
 
 
 def reward_weights(changes: Mapping[str, float] | None) -> dict[str, float]:
-    """Returns the default reward weights with these changes. Raises ``ValueError`` for an unknown term."""
+    """Returns the default reward weights with these changes.
+
+    Raises ``ValueError`` for an unknown term or a weight that is not finite.
+    """
     changed = dict(changes or {})
     _deprecated.rename_keys(changed, {"approached_per_m": "progress_per_m"})
     weights = dict(REWARD)
@@ -39,10 +44,12 @@ def reward_weights(changes: Mapping[str, float] | None) -> dict[str, float]:
         if name not in weights:
             raise ValueError(f"unknown reward term {name!r}; the terms are {', '.join(weights)}")
         weights[name] = float(weight)
+        if not math.isfinite(weights[name]):
+            raise ValueError(f"the weight of the reward term {name!r} is {weight}, expected a finite number")
     return weights
 
 
-class HelperEnv(gymnasium.Env[Any, Any]):
+class HelperEnv(Recreated, gymnasium.Env[Any, Any]):
     """Environment of one helper and the simulated partner of a task.
 
     - ``task``: a task, several, or ``None`` for the paper's eight.
@@ -56,7 +63,8 @@ class HelperEnv(gymnasium.Env[Any, Any]):
     - ``partner_image_size``: width and height of the partner's images, pixels; ``None`` for those of scored runs. A smaller
       size is faster and reduces what the partner sees. ``minds_image_size`` is its deprecated name.
 
-    The attribute ``grants`` lists all grants.
+    The attribute ``grants`` lists all grants. ``pickle`` and ``copy`` create a new environment from the same arguments, which
+    needs a reset.
     """
 
     metadata = {"render_modes": ["rgb_array", "human", "ansi"], "render_fps": 3}
@@ -137,7 +145,9 @@ class HelperEnv(gymnasium.Env[Any, Any]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Obs, Info]:
         """Starts an episode: one drawn from the split, or ``options["episode"]``, an id or an ``Episode``, with
-        ``options["seed"]``."""
+        ``options["seed"]``. Raises ``ValueError`` for other options."""
+        if unknown := {*(options or ())} - {"episode", "seed"}:
+            raise ValueError(f"an environment has no reset option {sorted(unknown)}; it has episode and seed")
         super().reset(seed=seed)
         episode, world_seed = self.source.choose(self.np_random, options)
         if self.world is None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from chaic import _deprecated, spaces
 from chaic._chaic import ACTIONS, PROPRIOCEPTION, Batch, Episode, World
+from chaic._recreated import Recreated
 from chaic.episodes import EpisodeSource
 from chaic.gym import reward_weights
 
@@ -20,9 +21,13 @@ Arrays = dict[str, NDArray[Any]]
 
 #: Parts of an observation that a vector environment supports.
 PARTS = ("rgb", "depth", "ids", "proprioception")
+#: Maximum number of worlds. Each takes about 3 MB, all of them 50 GB.
+MAX_ENVS = 1 << 14
+#: Maximum number of pixels of all worlds. Each takes about 34 bytes for color and depth, all of them 36 GB.
+MAX_PIXELS = 1 << 30
 
 
-class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
+class HelperVectorEnv(Recreated, VectorEnv[Arrays, Any, Any]):
     """Helpers in ``num_envs`` worlds, each with its simulated partner. Options as in ``chaic.gym.HelperEnv``, without
     ``action`` and ``perception``: actions are primitive, and an observation has no ``map``.
 
@@ -56,8 +61,8 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
         minds_image_size: int | None = None,
     ) -> None:
         partner_image_size = _deprecated.partner_image_size(partner_image_size, minds_image_size)
-        if num_envs < 1:
-            raise ValueError(f"num_envs is {num_envs}, expected at least 1")
+        if not 1 <= num_envs <= MAX_ENVS:
+            raise ValueError(f"num_envs is {num_envs}, expected 1 to {MAX_ENVS}")
         self.parts = spaces.parse_parts(observation)
         for part in self.parts:
             if part not in PARTS:
@@ -86,6 +91,11 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
         }
         # Invalid options raise an error here, not in the first reset.
         World(self.source.get(self.source.ids[0]), 0, **self._options)
+        if spaces.image_parts(self.parts) and num_envs * image_size**2 > MAX_PIXELS:
+            raise ValueError(
+                f"{num_envs} images of {image_size}x{image_size} pixels need too much memory; num_envs is at most "
+                f"{MAX_PIXELS // image_size**2} at this image_size"
+            )
         self._single = spaces.observation_space(self.parts, image_size)
         self._actions = spaces.primitive_space(image_size)
         self.single_observation_space = self._single
@@ -132,9 +142,9 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
         if unknown := set(options or ()) - {"reset_mask"}:
             raise ValueError(f"a vector environment has no reset option {sorted(unknown)}; it has reset_mask")
         if options is not None and "reset_mask" in options:
-            mask = np.asarray(options["reset_mask"], bool)
-            if mask.shape != (self.num_envs,):
-                raise ValueError(f"reset_mask has shape {mask.shape}, expected ({self.num_envs},)")
+            mask = np.asarray(options["reset_mask"])
+            if mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
+                raise ValueError(f"reset_mask is {mask.dtype} {mask.shape}, expected bool ({self.num_envs},)")
         self._seed(seed, mask)
         if self.batch is None:
             if not mask.all():

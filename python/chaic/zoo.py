@@ -17,6 +17,7 @@ from pettingzoo import AECEnv, ParallelEnv
 
 from chaic import _deprecated, spaces
 from chaic._chaic import ACTIONS, World, weigh_reward
+from chaic._recreated import Recreated
 from chaic.episodes import EpisodeSource
 from chaic.gym import PICTURE_SIZE, Obs, reward_weights
 
@@ -122,7 +123,7 @@ class _Pair:
         )
 
 
-class _PairBase:
+class _PairBase(Recreated):
     """Options, spaces and rendering of both environments."""
 
     metadata: dict[str, Any]
@@ -145,6 +146,8 @@ class _PairBase:
         super().__init__()
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f'unknown render mode {render_mode!r}; the mode is "rgb_array"')
+        if max_cycles is not None and max_cycles < 1:
+            raise ValueError(f"max_cycles is {max_cycles}, expected at least 1")
         self._pair = _Pair(
             task, split, observation, image_size, grants, rules, set, appearance, reward
         )
@@ -249,16 +252,17 @@ class PairEnv(_PairBase, AECEnv[str, Obs, Any]):
 
     def step(self, action: Any) -> None:
         """Submits the action of the selected agent; ``None`` for an agent that has ended."""
+        world = self.world
         if not self.agents:
             return
         agent = self.agent_selection
         if self.terminations[agent] or self.truncations[agent]:
             self._was_dead_step(action)
-            if self.agents and not self.world.is_over:
+            if self.agents and not world.is_over:
                 self._advance()
                 self._accumulate_rewards()
             return
-        self.world.submit(self._pair.parse(action), AGENTS.index(agent))
+        world.submit(self._pair.parse(action), AGENTS.index(agent))
         self._n_actions[agent] += 1
         self._cumulative_rewards[agent] = 0.0
         self._clear_rewards()
@@ -304,16 +308,17 @@ class PairParallelEnv(_PairBase, ParallelEnv[str, Obs, Any]):
         dict[str, Obs], dict[str, float], dict[str, bool], dict[str, bool], dict[str, Any]
     ]:
         """Submits the actions of all agents and advances; actions of busy agents are ignored."""
+        world = self.world
         if not self.agents:
             return {}, {}, {}, {}, {}
         # All actions are checked before the first is submitted, so an invalid one changes nothing.
-        rows = [(agent_id, self._pair.parse(actions[AGENTS[agent_id]])) for agent_id in self.world.waiting()]
+        rows = [(agent_id, self._pair.parse(actions[AGENTS[agent_id]])) for agent_id in world.waiting()]
         for agent_id, row in rows:
-            self.world.submit(row, agent_id)
+            world.submit(row, agent_id)
         waiting = self._advance()
         self._steps += 1
         ended = not waiting
-        complete = bool(self.world.score()["complete"])
+        complete = bool(world.score()["complete"])
         is_cut = self.max_cycles is not None and self._steps >= self.max_cycles
         # The last step pays what a running action has earned so far.
         rewarded = range(len(AGENTS)) if ended or is_cut else waiting

@@ -1,6 +1,8 @@
 """Gymnasium environments."""
 
+import copy
 import os
+import pickle
 import signal
 import time
 
@@ -71,12 +73,16 @@ def test_invalid_arguments_are_refused():
     for seed in (-1, 2**32, 1.5, "a"):
         with pytest.raises(ValueError, match="option seed"):
             env.reset(options={"seed": seed})
+    with pytest.raises(ValueError, match="no reset option .*episodes"):
+        env.reset(options={"episodes": "obstacle/train/03"})
     with pytest.raises(ValueError):
         gymnasium.make(IDS["obstacle"], observation="smell")
     with pytest.raises(ValueError):
         gymnasium.make(IDS["obstacle"], action="dance")
     with pytest.raises(ValueError):
         gymnasium.make(IDS["obstacle"], reward={"fame": 1.0})
+    with pytest.raises(ValueError, match="expected a finite number"):
+        gymnasium.make(IDS["obstacle"], reward={"delivered": float("nan")})
 
 
 @pytest.mark.parametrize(
@@ -203,8 +209,14 @@ def test_invalid_vector_arguments_are_refused():
     for invalid in (np.zeros((3, 3), int), np.zeros((2, 3)), np.full((2, 3), 99), np.full((2, 3), -1)):
         with pytest.raises(ValueError):
             vector.step(invalid)
-    with pytest.raises(ValueError):
-        make(0)
+    with pytest.raises(ValueError, match="reset_mask is int64"):
+        # Indices of worlds are no mask.
+        vector.reset(options={"reset_mask": np.array([0, 1])})
+    for n in (0, 10_000_000):
+        with pytest.raises(ValueError, match="expected 1 to 16384"):
+            make(n, observation="proprioception")
+    with pytest.raises(ValueError, match="num_envs is at most 1024"):
+        make(2000, image_size=1024)
     with pytest.raises(ValueError, match="unknown render mode"):
         HelperVectorEnv("obstacle", render_mode="human")
     first, again = (make(2, observation="proprioception").reset(seed=seed)[1] for seed in (3, np.int64(3)))
@@ -252,6 +264,31 @@ def test_environments_run_in_separate_processes():
         envs.step(np.zeros((2, 3), np.int64))
         envs.close()
         assert observation["rgb"].shape == (2, 32, 32, 3)
+
+
+class SmallEnv(HelperEnv):
+    """Environment with other arguments than its base class."""
+
+    def __init__(self, image_size: int) -> None:
+        super().__init__("obstacle", observation="proprioception", image_size=image_size, reward={"invalid": 3.0})
+
+
+def test_pickles_and_copies_are_new_environments_with_the_same_arguments():
+    def create():
+        yield gymnasium.make(IDS["obstacle"], action="plan", image_size=32)
+        yield SmallEnv(48)
+        yield HelperVectorEnv("obstacle", 2, observation="proprioception")
+
+    for env in create():
+        expected, _ = env.reset(seed=4)
+        for again in (pickle.loads(pickle.dumps(env)), copy.deepcopy(env)):
+            assert type(again.unwrapped) is type(env.unwrapped) and again.spec == env.spec
+            assert again.unwrapped.weights == env.unwrapped.weights
+            with pytest.raises(gymnasium.error.ResetNeeded):
+                again.step(again.action_space.sample())
+            observation, _ = again.reset(seed=4)
+            for part, array in expected.items():
+                assert (observation[part] == array).all(), part
 
 
 def test_a_vector_returns_new_arrays_unless_it_writes_into_given_ones():

@@ -257,6 +257,22 @@ def test_a_resumed_run_has_the_options_of_its_start(tmp_path):
     assert run.options["split"] == "train" and len(run.results()) == 1
 
 
+def test_a_resumed_run_has_the_images_of_its_start(tmp_path):
+    class Interrupts(Turner):
+        def act(self, observation):
+            raise KeyboardInterrupt
+
+    start = {"out": tmp_path / "run", **OPTIONS}
+    with pytest.raises(KeyboardInterrupt):
+        chaic.evaluate({"turner": Interrupts}, **start)
+    for change in [{"image_size": 32}, {"images": ("rgb", "depth")}, {"images": ()}]:
+        other = type("Other", (Turner,), change)
+        with pytest.raises(ValueError, match="turner requests .* now, but .*run.json has depth of 64 pixels"):
+            chaic.evaluate({"turner": other}, resume=True, **start)
+    run = chaic.evaluate(Turner, resume=True, **start)
+    assert len(run.results()) == 1
+
+
 def test_a_resumed_run_has_the_perception_of_its_start(tmp_path, episode):
     folder = write_short_episode(episode, tmp_path / "episodes", horizon=60)
     start = {"baselines": "rhp", "out": tmp_path / "run", "quiet": True}

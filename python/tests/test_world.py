@@ -1,5 +1,6 @@
 """Worlds, episodes, planners and built-in helpers in Python."""
 
+import copy
 import json
 import os
 import pickle
@@ -138,6 +139,14 @@ def test_show_opens_the_top_view_in_the_browser(episode, monkeypatch):
     chaic.World(episode).show()
     assert all("data:image/png" in Path(url.removeprefix("file://")).read_text() for url in opened)
     assert len(opened) == 2
+
+
+def test_objects_with_a_state_are_neither_pickled_nor_copied(episode):
+    world, batch = chaic.World(episode, **OPTIONS), chaic.Batch([episode], [0], **OPTIONS)
+    for item in (world, batch, chaic.Planner(), chaic.PlanningAgent("rhp")):
+        for function in (pickle.dumps, copy.copy, copy.deepcopy):
+            with pytest.raises(TypeError, match=f"a {type(item).__name__} can be neither pickled nor copied: "):
+                function(item)
 
 
 def test_a_changed_episode_is_parsed_and_checked(episode):

@@ -1,7 +1,9 @@
 """PettingZoo environments, checked with the tests of PettingZoo."""
 
+import pickle
 import warnings
 
+import gymnasium
 import numpy as np
 import pytest
 
@@ -120,3 +122,18 @@ def test_invalid_arguments_are_refused():
         zoo.env("obstacle", set="nothing=1", **OPTIONS)
     with pytest.raises(ValueError, match="rgb_array"):
         zoo.parallel_env("obstacle", render_mode="human")
+    for create in (zoo.env, zoo.parallel_env):
+        with pytest.raises(ValueError, match="max_cycles is 0"):
+            create("obstacle", max_cycles=0)
+
+
+def test_a_pickle_is_a_new_environment():
+    for create in (zoo.env, zoo.parallel_env):
+        env = create("obstacle", max_cycles=7, **OPTIONS)
+        env.reset(seed=0)
+        again = pickle.loads(pickle.dumps(env))
+        assert again.max_cycles == 7 and again.action_spaces == env.action_spaces
+        with pytest.raises(gymnasium.error.ResetNeeded):
+            again.step({})
+        again.reset(seed=0)
+        assert again.world.digest() == env.world.digest()

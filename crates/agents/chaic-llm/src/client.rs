@@ -7,11 +7,12 @@ use chaic_core::{AgentId, Frame};
 use chaic_env::RunKey;
 
 use crate::endpoint::{Client, Failure, ImagesByHash, NoReply};
+use crate::error::LlmError;
 use crate::exchange::{ChatRequest, DecisionRecord, Exchange, Fault, FaultKind, Reply, Usage};
 use crate::rate_limiter::{self, Admission, RateLimiter, Spent};
 use crate::record::{self, DecisionLog, DecisionLogWriter, RecordEntry, RecordHeader};
 use crate::session::{Session, Source};
-use crate::settings::{AnswerForm, FailureAction};
+use crate::settings::{AnswerForm, FailureAction, Settings};
 
 /// Requests of one agent in one episode run, with its record.
 pub struct LlmClient<'a> {
@@ -29,6 +30,12 @@ pub struct Conversation {
 /// The run must stop; no further decision is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Halted;
+
+/// Stops the run because of an error.
+fn halt(session: &Session, error: &LlmError) -> Halted {
+    session.halt(error.to_string());
+    Halted
+}
 
 impl Conversation {
     /// Opens the record of an agent; halts the session on failure.
@@ -56,11 +63,21 @@ impl Conversation {
     }
 
     fn push(&mut self, session: &Session, entry: RecordEntry) -> Result<(), Halted> {
-        let pushed = self.recorder.as_mut().map_or(Ok(()), |r| r.push(entry));
-        pushed.map_err(|error| {
-            session.halt(error.to_string());
-            Halted
-        })
+        let Some(recorder) = &mut self.recorder else { return Ok(()) };
+        let pushed = recorder.push(entry);
+        if let Some(copy) = recorder.take_kept() {
+            session.warn_of_kept_record(&copy);
+        }
+        pushed.map_err(|error| halt(session, &error))
+    }
+
+    /// Checks that the record has room for the answer to a request, before the request is paid for.
+    fn check_room(&self, session: &Session, request: &ChatRequest) -> Result<(), Halted> {
+        let Settings { endpoint, retry, .. } = &session.settings;
+        let checked = self.recorder.as_ref().map_or(Ok(()), |r| {
+            r.check_room(request, endpoint.max_answer_bytes, retry.max_attempts)
+        });
+        checked.map_err(|error| halt(session, &error))
     }
 
     /// Records a decision.
@@ -97,6 +114,7 @@ impl<'a> LlmClient<'a> {
                 exchange
             }
             (None, Source::Live(client)) => {
+                self.conversation.check_room(self.session, &request)?;
                 self.send_with_retries(client, frame, request, images)?
             }
             (None, Source::Replay(_)) => self.next_replayed(frame, &request)?,

@@ -97,9 +97,9 @@ pub enum LlmError {
     },
     /// A record would become larger than what can be read.
     #[error(
-        "{path} can't grow beyond {max_mib} MiB, so the run stopped before the next entry; it can still \
-         be read; start another run with a smaller request.max_prompt_tokens or \
-         endpoint.max_answer_bytes",
+        "{path} can't grow beyond {max_mib} MiB and may have no room for the next answer, so the run \
+         stopped; the record can still be read; resume with a smaller endpoint.max_answer_bytes, or start \
+         another run with a smaller request.max_prompt_tokens",
         path = path.display()
     )]
     RecordFull {
@@ -107,6 +107,33 @@ pub enum LlmError {
         path: PathBuf,
         /// Maximum size, MiB.
         max_mib: u64,
+    },
+    /// A resumed episode can't continue its record, which may hold the only copy of paid answers.
+    #[error(
+        "{path} can't be continued, but it may hold paid answers, so it is kept and the run stopped; to \
+         ask again, move it out of the run and resume: {problem}",
+        path = path.display()
+    )]
+    NotContinued {
+        /// Path of the file.
+        path: PathBuf,
+        /// Cause.
+        problem: String,
+    },
+    /// A run with a budget has a record that can't be read.
+    #[error(
+        "{path} can't be read, so what the run has spent is unknown and its budget can't be kept; move the \
+         file out of the run and lower the budget by what it spent, or resume without a budget: line {line}: \
+         {problem}",
+        path = path.display()
+    )]
+    UnknownSpending {
+        /// Path of the file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// Cause.
+        problem: String,
     },
     /// A record is invalid.
     #[error("{path}: line {line}: {problem}", path = path.display())]

@@ -1,7 +1,10 @@
 //! Record of one agent in one episode run: an append-only file of JSON lines.
 //!
 //! When an interrupted episode is played again, existing entries are reused as long as the requests
-//! are equal, so that no answered request is sent twice.
+//! are equal, so that no answered request is sent twice. A record that can't be continued is kept, and so
+//! is a copy of one whose requests differ. No request is sent whose answer might have no room.
+
+mod kept;
 
 use std::io::{Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
@@ -16,14 +19,25 @@ use serde::{Deserialize, Serialize};
 use crate::error::{LlmError, Result};
 use crate::exchange::{ChatRequest, DecisionRecord, Exchange};
 
+pub(crate) use kept::with_copies;
+
 /// Format name in the first line.
 pub const FORMAT: &str = "chaic-llm";
 /// Version of the format.
 pub const VERSION: u32 = 1;
+/// Extension of the files.
+const EXTENSION: &str = "jsonl";
 /// Maximum size of a record, MiB: a hundred times a typical one.
 const MAX_RECORD_MIB: u64 = 256;
 /// The same in bytes.
 const MAX_RECORD_BYTES: u64 = MAX_RECORD_MIB << 20;
+/// Maximum size of the first line of a record, bytes: a hundred times a typical one.
+const MAX_HEADER_BYTES: u64 = 1 << 16;
+/// Maximum size of a failed attempt in an entry, bytes: its description has a few hundred characters.
+const MAX_FAULT_BYTES: u64 = 1 << 12;
+/// Maximum size of the other parts of an exchange besides request, answer and failed attempts, and of
+/// its decision, bytes.
+const MAX_OVERHEAD_BYTES: u64 = 1 << 13;
 
 /// Returns the folder of a run's records.
 pub fn folder(run: &Path) -> PathBuf {
@@ -181,6 +195,7 @@ fn parse(line: &[u8]) -> std::result::Result<RecordEntry, String> {
 /// Record open for writing.
 #[derive(Debug)]
 pub struct DecisionLogWriter {
+    run: PathBuf,
     path: PathBuf,
     file: OutputFile,
     /// Entries from before.
@@ -191,24 +206,21 @@ pub struct DecisionLogWriter {
     end: u64,
     /// True if the rest of the file must be truncated before a write.
     must_truncate: bool,
+    /// Copy of the file before it was truncated, until the caller takes it.
+    kept: Option<PathBuf>,
 }
 
 impl DecisionLogWriter {
     /// Creates a record in a run folder, or continues an existing record of the same agent.
     ///
     /// # Errors
-    /// If it is a link or no regular file, or cannot be read or written.
+    /// [`LlmError::NotContinued`] if there is a damaged or too long record, or one of another agent, which
+    /// stays as it is; if the record is a link or no regular file, or cannot be read or written.
     pub fn open(run: &Path, path: &Path, header: &RecordHeader) -> Result<DecisionLogWriter> {
         create_folders_below(run, path.parent().unwrap_or(run))?;
         let before = match kind_below(run, path)? {
             EntryKind::Missing => None,
-            // A damaged record, or one of another agent, is replaced; one that the system cannot read
-            // now is kept.
-            _ => match DecisionLog::read(run, path) {
-                Ok(record) => Some(record).filter(|record| record.header == *header),
-                Err(LlmError::Unreadable { .. }) => None,
-                Err(error) => return Err(error),
-            },
+            _ => read_before(run, path, header)?,
         };
         let is_new = before.is_none();
         let refused = || LlmError::io("write", path);
@@ -224,8 +236,9 @@ impl DecisionLogWriter {
             ends: Vec::new(),
             header_end: first.len() as u64,
         });
-        let (path, end) = (path.to_owned(), before.header_end);
-        Ok(DecisionLogWriter { path, file, before, used: 0, end, must_truncate: true })
+        let (run, path, end) = (run.to_owned(), path.to_owned(), before.header_end);
+        let (used, must_truncate, kept) = (0, true, None);
+        Ok(DecisionLogWriter { run, path, file, before, used, end, must_truncate, kept })
     }
 
     /// Returns the recorded exchange of this request, if the record has it at this position.
@@ -236,7 +249,35 @@ impl DecisionLogWriter {
         (exchange.request_hash == request.hash()).then(|| (**exchange).clone())
     }
 
-    /// Appends an entry, unless the record has it at this position.
+    /// Checks that the record has room for the exchange and the decision of a request with the longest
+    /// answer and the most failed attempts.
+    ///
+    /// # Errors
+    /// [`LlmError::RecordFull`] if it may have none.
+    pub fn check_room(
+        &self,
+        request: &ChatRequest,
+        max_answer_bytes: u64,
+        max_attempts: u32,
+    ) -> Result<()> {
+        let request_bytes = serde_json::to_vec(request).expect("a request has string keys").len();
+        // An answer is no longer in the record than in the response, where it was JSON too.
+        let max_reply_bytes = max_answer_bytes + u64::from(max_attempts) * MAX_FAULT_BYTES;
+        let end = self.end + request_bytes as u64 + max_reply_bytes + MAX_OVERHEAD_BYTES;
+        if end > MAX_RECORD_BYTES { Err(self.full()) } else { Ok(()) }
+    }
+
+    fn full(&self) -> LlmError {
+        LlmError::RecordFull { path: self.path.clone(), max_mib: MAX_RECORD_MIB }
+    }
+
+    /// Returns the path of the copy that the last [`DecisionLogWriter::push`] made.
+    pub fn take_kept(&mut self) -> Option<PathBuf> {
+        self.kept.take()
+    }
+
+    /// Appends an entry, unless the record has it at this position. If it has other exchanges there, a copy
+    /// of the record is kept first.
     ///
     /// # Errors
     /// If the file cannot be written, or would become larger than what [`DecisionLog::read`] reads.
@@ -250,7 +291,11 @@ impl DecisionLogWriter {
         let line = entry.to_line();
         let end = self.end + line.len() as u64;
         if end > MAX_RECORD_BYTES {
-            return Err(LlmError::RecordFull { path: self.path.clone(), max_mib: MAX_RECORD_MIB });
+            return Err(self.full());
+        }
+        let mut rest = self.before.entries[self.used..].iter();
+        if self.must_truncate && rest.any(|entry| matches!(entry, RecordEntry::Exchange(_))) {
+            self.kept = Some(kept::keep(&self.run, &self.path)?);
         }
         let refused = || LlmError::io("write", &self.path);
         if std::mem::take(&mut self.must_truncate) {
@@ -265,14 +310,36 @@ impl DecisionLogWriter {
     }
 }
 
-/// Returns the paths of all records of a run, sorted, without links.
+/// Returns whether a record was stopped in its first line, and so has no entry.
+pub(crate) fn is_unstarted(run: &Path, path: &Path) -> Result<bool> {
+    let start = read_below(run, path, MAX_HEADER_BYTES + 1)?;
+    Ok(start.len() as u64 <= MAX_HEADER_BYTES && !start.contains(&b'\n'))
+}
+
+/// Reads the record that a resumed episode continues; `None` if it [has no entry](is_unstarted).
+fn read_before(run: &Path, path: &Path, header: &RecordHeader) -> Result<Option<DecisionLog>> {
+    if is_unstarted(run, path)? {
+        return Ok(None);
+    }
+    let problem = match DecisionLog::read(run, path) {
+        Ok(record) if record.header == *header => return Ok(Some(record)),
+        Ok(DecisionLog { header: RecordHeader { key, agent, model, .. }, .. }) => format!(
+            "is of {} with helper {}, seed {}, agent {agent} and model {model}",
+            key.episode, key.helper, key.seed
+        ),
+        Err(LlmError::Unreadable { line, problem, .. }) => format!("line {line}: {problem}"),
+        Err(error) => return Err(error),
+    };
+    Err(LlmError::NotContinued { path: path.to_owned(), problem })
+}
+
+/// Returns the paths of all records of a run, sorted, without links and kept copies.
 ///
 /// # Errors
 /// If the folder cannot be read.
 pub fn all(run: &Path) -> Result<Vec<PathBuf>> {
-    let is_record = |entry: &chaic_files::Entry| {
-        entry.kind == EntryKind::File && entry.path.extension().is_some_and(|e| e == "jsonl")
-    };
+    let is_record =
+        |entry: &chaic_files::Entry| entry.kind == EntryKind::File && kept::is_record(&entry.path);
     Ok(walk(&folder(run), 2)?.into_iter().filter(is_record).map(|entry| entry.path).collect())
 }
 
@@ -291,7 +358,7 @@ mod tests {
         ChatRequest { model, purpose: Purpose::Decide, messages, n_schema_plans: Some(3) }
     }
 
-    fn exchange(text: &str) -> RecordEntry {
+    pub(super) fn exchange(text: &str) -> RecordEntry {
         let fault = Fault { kind: FaultKind::Empty, status: None, detail: "empty".to_owned() };
         RecordEntry::Exchange(Box::new(Exchange::new(
             7,
@@ -301,7 +368,7 @@ mod tests {
         )))
     }
 
-    fn decided(frame: u32) -> RecordEntry {
+    pub(super) fn decided(frame: u32) -> RecordEntry {
         RecordEntry::Decision(DecisionRecord {
             frame,
             number: Some(1),
@@ -314,13 +381,13 @@ mod tests {
         })
     }
 
-    fn header() -> RecordHeader {
+    pub(super) fn header() -> RecordHeader {
         let (task, helper) = (TaskId::Obstacle, "llm".to_owned());
         let key = RunKey { task, helper, episode: "obstacle/test/00".to_owned(), seed: 0 };
         RecordHeader::new(&key, AgentId::HELPER, "m")
     }
 
-    fn write(path: &Path, entries: &[RecordEntry]) {
+    pub(super) fn write(path: &Path, entries: &[RecordEntry]) {
         let run = path.parent().unwrap();
         let mut recorder = DecisionLogWriter::open(run, path, &header()).unwrap();
         entries.iter().for_each(|e| recorder.push(e.clone()).unwrap());
@@ -426,12 +493,70 @@ mod tests {
     }
 
     #[test]
-    fn an_invalid_record_is_replaced() {
+    fn a_record_with_room_takes_the_longest_answer() {
+        const MAX_ANSWER: usize = 1000;
+        const ATTEMPTS: usize = 3;
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("r.jsonl");
-        fs::write(&path, "{}\n").unwrap();
-        write(&path, &[decided(1)]);
-        assert_eq!(DecisionLog::read(dir.path(), &path).unwrap().entries, [decided(1)]);
+        let mut recorder = DecisionLogWriter::open(dir.path(), &path, &header()).unwrap();
+        recorder.push(decided(0)).unwrap();
+        let request = request("two");
+        let mut has_room = |left: u64| {
+            recorder.end = MAX_RECORD_BYTES - left;
+            recorder.check_room(&request, MAX_ANSWER as u64, ATTEMPTS as u32).is_ok()
+        };
+        let left = (0..).step_by(64).find(|left| has_room(*left)).unwrap();
+        assert!(left < 64 << 10 && !has_room(left - 64) && has_room(left));
+        let detail = "\u{10ffff}".repeat(300) + &"\"".repeat(100);
+        let fault = Fault { kind: FaultKind::Connection, status: Some(u16::MAX), detail };
+        let reply = Reply::Answer {
+            text: "a".repeat(MAX_ANSWER),
+            finish: Some("\u{10ffff}".repeat(300)),
+            usage: Default::default(),
+            latency_ms: u64::MAX,
+        };
+        let exchange = Exchange::new(u32::MAX, request.clone(), vec![fault; ATTEMPTS], reply);
+        recorder.push(RecordEntry::Exchange(Box::new(exchange))).unwrap();
+        recorder.push(decided(1)).unwrap();
+    }
+
+    #[test]
+    fn a_record_that_was_stopped_in_its_first_line_is_started_again() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("r.jsonl");
+        for torn in ["", "{\"format\":\"cha", "\0\0\0\0"] {
+            fs::write(&path, torn).unwrap();
+            write(&path, &[decided(1)]);
+            assert_eq!(DecisionLog::read(dir.path(), &path).unwrap().entries, [decided(1)]);
+        }
+    }
+
+    #[test]
+    fn a_record_that_cannot_be_continued_is_kept() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("r.jsonl");
+        write(&path, &[exchange("one"), decided(1)]);
+        let whole = fs::read_to_string(&path).unwrap();
+        for (text, problem) in [
+            ("{}\n".to_owned(), "line 1: missing field"),
+            (whole.replacen("\"version\":1", "\"version\":2", 1), "chaic-llm version 2"),
+            (whole.replacen("one", "0ne", 1), "line 2: the request differs from its hash"),
+            (whole.replacen("\"model\":\"m\"", "\"model\":\"n\"", 1), "and model n"),
+            ("x".repeat(MAX_HEADER_BYTES as usize + 1), "line 1: has no complete first line"),
+        ] {
+            fs::write(&path, &text).unwrap();
+            let opened = DecisionLogWriter::open(dir.path(), &path, &header());
+            let error = opened.unwrap_err().to_string();
+            assert!(error.contains(problem) && error.contains("paid answers"), "{error}");
+            assert_eq!(fs::read_to_string(&path).unwrap(), text, "{problem}");
+        }
+        // An earlier version wrote more than is read.
+        fs::write(&path, &whole).unwrap();
+        open_or_create(&path).unwrap().set_len(MAX_RECORD_BYTES + 1).unwrap();
+        let opened = DecisionLogWriter::open(dir.path(), &path, &header());
+        let error = opened.unwrap_err().to_string();
+        assert!(error.contains("is longer than 268435456 bytes"), "{error}");
+        assert_eq!(fs::metadata(&path).unwrap().len(), MAX_RECORD_BYTES + 1);
     }
 
     #[cfg(unix)]

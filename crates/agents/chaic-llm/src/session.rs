@@ -42,6 +42,8 @@ pub struct Session {
     listener: OnceLock<Listener>,
     /// Consecutive failed requests. The initial value makes the first failure visible to the user.
     failures: AtomicU32,
+    /// True after the message about a kept record.
+    has_warned: AtomicBool,
     run: OnceLock<(PathBuf, RateLimiter)>,
 }
 
@@ -89,7 +91,18 @@ impl Session {
         let templates = Templates::load(settings.request.templates.as_deref())?;
         let (problem, listener, run) = (Mutex::new(None), OnceLock::new(), OnceLock::new());
         let failures = AtomicU32::new(NOTIFY_AFTER - 1);
-        Ok(Session { settings, templates, source, stop, problem, listener, failures, run })
+        let has_warned = AtomicBool::new(false);
+        Ok(Session {
+            settings,
+            templates,
+            source,
+            stop,
+            problem,
+            listener,
+            failures,
+            has_warned,
+            run,
+        })
     }
 
     /// Binds the session to a run folder: records the settings, or compares them with the recorded
@@ -114,7 +127,9 @@ impl Session {
                 write_atomically(&path, (text + "\n").as_bytes())?;
             }
         }
-        let earlier = spent_before(run, &self.settings.price)?;
+        let is_limited =
+            matches!(self.source, Source::Live(_)) && self.settings.budget.limits_spending();
+        let earlier = spent_before(run, &self.settings.price, is_limited)?;
         let limiter = RateLimiter::new(
             self.settings.budget,
             self.settings.endpoint.max_concurrent_requests,
@@ -170,6 +185,19 @@ impl Session {
             listener(&format!(
                 "the model cannot be reached at the moment: {fault}; each request is tried up to \
                  {attempts} times"
+            ));
+        }
+    }
+
+    /// Warns the user, once, that a resumed episode asks other questions than its record has.
+    pub fn warn_of_kept_record(&self, copy: &Path) {
+        let Some(listener) = self.listener.get() else { return };
+        if !self.has_warned.swap(true, Ordering::Relaxed) {
+            listener(&format!(
+                "warning: a resumed episode asks other questions than before, so another build of chaic or a \
+                 process that decides differently each time plays it; the questions are asked again, and the \
+                 old record with its paid answers is kept as {}; further ones are kept without a message",
+                copy.display()
             ));
         }
     }
@@ -254,28 +282,53 @@ fn compare(run: &Path, recorded: &Recorded, current: &Recorded) -> Result<()> {
     Ok(())
 }
 
-/// Sums up the spending in a run's records.
-fn spent_before(run: &Path, price: &Price) -> Result<Spent> {
+/// Sums up the spending in a run's records and in the copies of replaced ones.
+///
+/// # Errors
+/// [`LlmError::UnknownSpending`] if one can't be read and `is_limited`.
+fn spent_before(run: &Path, price: &Price, is_limited: bool) -> Result<Spent> {
     let mut spent = Spent::default();
-    for path in record::all(run)? {
-        let record = match DecisionLog::read(run, &path) {
-            Ok(record) => record,
-            // A damaged record is replaced when its episode is played again.
-            Err(LlmError::Unreadable { .. }) => continue,
-            Err(error) => return Err(error),
-        };
-        for entry in record.entries {
-            if let RecordEntry::Exchange(exchange) = entry {
-                spent.add(Spent::new(exchange.requests(), exchange.usage(), price));
+    for files in record::with_copies(run)? {
+        let mut logs: Vec<Vec<RecordEntry>> = Vec::new();
+        for path in files {
+            if record::is_unstarted(run, &path)? {
+                continue;
             }
+            let entries = match DecisionLog::read(run, &path) {
+                Ok(record) => record.entries,
+                Err(LlmError::Unreadable { path, line, problem }) if is_limited => {
+                    return Err(LlmError::UnknownSpending { path, line, problem });
+                }
+                // A damaged record stops the run when its episode is played again.
+                Err(LlmError::Unreadable { .. }) => continue,
+                Err(error) => return Err(error),
+            };
+            // A copy and its record begin with the same entries.
+            let n_shared = logs.iter().map(|log| shared_len(log, &entries)).max().unwrap_or(0);
+            for entry in &entries[n_shared..] {
+                if let RecordEntry::Exchange(exchange) = entry {
+                    spent.add(Spent::new(exchange.requests(), exchange.usage(), price));
+                }
+            }
+            logs.push(entries);
         }
     }
     Ok(spent)
 }
 
+/// Returns the number of equal entries at the start of two records.
+fn shared_len(a: &[RecordEntry], b: &[RecordEntry]) -> usize {
+    a.iter().zip(b).take_while(|(a, b)| a == b).count()
+}
+
 #[cfg(test)]
 mod tests {
+    use chaic_core::{AgentId, TaskId};
+    use chaic_env::RunKey;
+
     use super::*;
+    use crate::exchange::{ChatRequest, Exchange, Message, Purpose, Reply, Role, Usage};
+    use crate::record::{DecisionLogWriter, RecordHeader};
 
     fn session() -> Session {
         let mut settings = Settings::default();
@@ -299,5 +352,54 @@ mod tests {
         stopped.halt("the model cannot be reached".to_owned());
         assert!(stopped.is_interrupted(), "the user stopped the run first");
         assert_eq!(stopped.problem(), None);
+    }
+
+    #[test]
+    fn the_user_is_warned_of_the_first_kept_record() {
+        let session = session();
+        let lines = std::sync::Arc::new(Mutex::new(Vec::new()));
+        let heard = std::sync::Arc::clone(&lines);
+        session.listen(Box::new(move |line: &str| heard.lock().unwrap().push(line.to_owned())));
+        for name in ["a.jsonl.old-1", "b.jsonl.old-1"] {
+            session.warn_of_kept_record(Path::new(name));
+        }
+        let lines = lines.lock().unwrap();
+        assert!(lines.len() == 1 && lines[0].contains("is kept as a.jsonl.old-1;"), "{lines:?}");
+    }
+
+    /// Returns an answered request of 10 tokens.
+    fn exchange(text: &str) -> RecordEntry {
+        let message = Message { role: Role::User, text: text.to_owned(), images: Vec::new() };
+        let (model, messages) = ("m".to_owned(), vec![message]);
+        let request =
+            ChatRequest { model, purpose: Purpose::Decide, messages, n_schema_plans: None };
+        let usage = Usage { prompt: 8, answer: 2, estimated: false };
+        let reply = Reply::Answer { text: "1".to_owned(), finish: None, usage, latency_ms: 0 };
+        RecordEntry::Exchange(Box::new(Exchange::new(1, request, Vec::new(), reply)))
+    }
+
+    #[test]
+    fn replaced_answers_count_once_and_unknown_spending_stops_a_run_with_a_budget() {
+        let dir = tempfile::tempdir().unwrap();
+        let run = dir.path();
+        let (task, helper) = (TaskId::Obstacle, "llm".to_owned());
+        let key = RunKey { task, helper, episode: "obstacle/test/00".to_owned(), seed: 0 };
+        let path = record::path(run, &key, AgentId::HELPER);
+        let header = RecordHeader::new(&key, AgentId::HELPER, "m");
+        for texts in [["one", "two"], ["one", "three"], ["four", "five"]] {
+            let mut writer = DecisionLogWriter::open(run, &path, &header).unwrap();
+            texts.into_iter().for_each(|text| writer.push(exchange(text)).unwrap());
+        }
+        let price = Price::default();
+        let spent = |is_limited| spent_before(run, &price, is_limited);
+        let all = Spent { requests: 5, tokens: 50, cost: 0.0 };
+        assert_eq!(spent(true).unwrap(), all);
+        // It was stopped in its first line.
+        std::fs::write(path.with_file_name("torn.jsonl"), "{\"format\"").unwrap();
+        assert_eq!(spent(true).unwrap(), all);
+        std::fs::write(path.with_file_name("damaged.jsonl"), "{}\n").unwrap();
+        assert_eq!(spent(false).unwrap(), all);
+        let error = spent(true).unwrap_err().to_string();
+        assert!(error.contains("damaged.jsonl can't be read, so what the run"), "{error}");
     }
 }

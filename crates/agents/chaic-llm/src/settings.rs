@@ -235,6 +235,13 @@ pub struct Budget {
     pub on_exhausted: FailureAction,
 }
 
+impl Budget {
+    /// Returns whether it limits what all sessions together spend.
+    pub fn limits_spending(&self) -> bool {
+        self.max_requests.is_some() || self.max_tokens.is_some() || self.max_cost.is_some()
+    }
+}
+
 /// Prices of tokens.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]

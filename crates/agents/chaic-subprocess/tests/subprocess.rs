@@ -401,6 +401,36 @@ fn a_run_resumes_with_its_own_commands_only() {
 }
 
 #[test]
+fn a_run_resumes_with_its_own_limits_only() {
+    let run = tempfile::tempdir().unwrap();
+    let path = run.path().join("commands.json");
+    let attach = |change: fn(&mut Limits)| {
+        let mut program = command("python3 a.py");
+        change(&mut program.limits);
+        let commands = CommandRegistry::new(&BuiltInHelpers, vec![program], never_stop()).unwrap();
+        commands.attach_run(run.path()).map_err(|error| error.to_string())
+    };
+    attach(|limits| limits.decision = Duration::from_secs_f64(0.3)).unwrap();
+    let whole = std::fs::read_to_string(&path).unwrap();
+    attach(|limits| limits.decision = Duration::from_secs_f64(0.3)).unwrap();
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), whole);
+    let refused = attach(|_| ()).unwrap_err();
+    assert!(refused.contains("was started with --exec-decision-s 0.3, not 20; give"), "{refused}");
+    let refused = attach(|limits| {
+        limits.decision = Duration::from_secs_f64(0.3);
+        limits.memory_mib = 7;
+    });
+    let refused = refused.unwrap_err();
+    assert!(refused.contains("--exec-memory-mib 8192, not 7"), "{refused}");
+    // A run of an older version has no limits, before and after it is resumed.
+    let older = "[\n  {\n    \"name\": \"exec\",\n    \"command\": \"python3 a.py\"\n  }\n]";
+    std::fs::write(&path, older).unwrap();
+    attach(|limits| limits.memory_mib = 7).unwrap();
+    attach(|_| ()).unwrap();
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), older);
+}
+
+#[test]
 fn the_python_helper_delivers_objects() {
     let line = python_helper();
     let mut n_delivered = 0;

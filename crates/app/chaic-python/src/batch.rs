@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use crate::action;
 use crate::episode::Episode;
 use crate::error::{
-    failure, from_env, mistake, no_attribute, no_such, poisoned, readable, writable,
+    failure, from_env, mistake, no_attribute, no_such, not_picklable, poisoned, readable, writable,
 };
 use crate::observation::Briefing;
 use crate::options::Options;
@@ -355,5 +355,9 @@ impl Batch {
         let n = envs.envs().len();
         let env = envs.envs().get(world).ok_or_else(|| no_such("world", world, n))?;
         Ok(env.digest().to_string())
+    }
+
+    fn __reduce__(&self) -> PyResult<Py<PyAny>> {
+        Err(not_picklable("Batch", "create another one from its episodes and seeds"))
     }
 }

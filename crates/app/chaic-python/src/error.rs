@@ -9,7 +9,7 @@ use numpy::{
     BorrowError, Element, PyArray, PyArrayMethods as _, PyReadonlyArray, PyReadwriteArray,
 };
 use pyo3::exceptions::{
-    PyAttributeError, PyIndexError, PyOverflowError, PyRuntimeError, PyValueError,
+    PyAttributeError, PyIndexError, PyOverflowError, PyRuntimeError, PyTypeError, PyValueError,
 };
 use pyo3::prelude::*;
 
@@ -108,6 +108,11 @@ pub fn no_attribute(class: &str, name: &str, renamed: &[(&str, &str)]) -> PyErr 
         Some(new_name) => format!("{class}.{name} was renamed; use {class}.{new_name}"),
         None => format!("{class} has no attribute {name:?}"),
     })
+}
+
+/// Returns a `TypeError` for an object with a state that is not stored. `instead` is what to do.
+pub fn not_picklable(class: &str, instead: &str) -> PyErr {
+    PyTypeError::new_err(format!("a {class} can be neither pickled nor copied: {instead}"))
 }
 
 /// Returns a `RuntimeError` for a failure or an invalid state.

@@ -49,29 +49,40 @@ impl PyHelperRegistry<'_> {
         self.makers.iter().find(|(known, _)| known == name).map(|(_, maker)| maker)
     }
 
-    fn isolated(&self, name: &str) -> Option<Helper> {
-        let helpers = self.makers.iter().zip(&self.isolated);
-        let (_, helper) = helpers.into_iter().find(|((known, _), _)| known == name)?;
-        Some(Helper { agent: helper.agent(self.stop), grants: self.grants })
+    /// Returns an agent in a process of its own; `None` if the helpers are not isolated.
+    fn isolated(&self, name: &str) -> Option<Box<dyn Agent>> {
+        let mut helpers = self.makers.iter().zip(&self.isolated);
+        let (_, helper) = helpers.find(|((known, _), _)| known == name)?;
+        Some(helper.agent(self.stop))
     }
 }
 
 /// Agent that fails at its first action.
-struct FailedAgent(AgentError);
+struct FailedAgent {
+    error: AgentError,
+    sensors: SensorConfig,
+    isolation: Option<String>,
+}
+
+impl FailedAgent {
+    fn in_this_process(error: AgentError, sensors: SensorConfig) -> FailedAgent {
+        FailedAgent { error, sensors, isolation: Some(Isolation::Trusted.to_string()) }
+    }
+}
 
 impl Agent for FailedAgent {
     fn sensors(&self) -> SensorConfig {
-        SensorConfig::NONE
+        self.sensors
     }
 
     fn reset(&mut self, _: &chaic_core::Briefing) {}
 
     fn act(&mut self, _: &chaic_core::Observation) -> Result<Action, AgentError> {
-        Err(self.0.clone())
+        Err(self.error.clone())
     }
 
     fn isolation(&self) -> Option<String> {
-        Some(Isolation::Trusted.to_string())
+        self.isolation.clone()
     }
 }
 
@@ -81,29 +92,30 @@ impl HelperRegistry for PyHelperRegistry<'_> {
         self.built_in.names().into_iter().chain(own).collect()
     }
 
-    /// Returns an agent to read grants and sensors from; creates no Python object.
+    /// Returns an agent to read grants, sensors and isolation from; creates no Python object.
     fn make(&self, name: &str, rules: PlannerRules) -> Option<Helper> {
-        if let Some(helper) = self.isolated(name) {
-            return Some(helper);
+        if self.maker(name).is_none() {
+            return self.built_in.make(name, rules);
         }
-        match self.maker(name) {
-            None => self.built_in.make(name, rules),
-            Some(_) => {
-                let error = AgentError::Broken("the helper was not created".to_owned());
-                Some(Helper { agent: Box::new(FailedAgent(error)), grants: self.grants })
-            }
+        let error = AgentError::Broken("the helper was not created".to_owned());
+        let mut agent = FailedAgent::in_this_process(error, self.sensors);
+        if let Some(isolated) = self.isolated(name) {
+            agent.isolation = isolated.isolation();
         }
+        Some(Helper { agent: Box::new(agent), grants: self.grants })
     }
 
     fn make_for(&self, key: &RunKey, rules: PlannerRules) -> Option<Helper> {
-        let maker = self.maker(&key.helper).filter(|_| self.isolated.is_empty());
-        let Some(maker) = maker else { return self.make(&key.helper, rules) };
+        let Some(maker) = self.maker(&key.helper) else { return self.make(&key.helper, rules) };
+        if let Some(agent) = self.isolated(&key.helper) {
+            return Some(Helper { agent, grants: self.grants });
+        }
         let created = Python::attach(|py| {
             maker.call0(py).map_err(|error| agent_error(py, &error, self.stop))
         });
         let agent: Box<dyn Agent> = match created {
             Ok(object) => Box::new(PyAgent::new(object, self.sensors, self.stop)),
-            Err(error) => Box::new(FailedAgent(error)),
+            Err(error) => Box::new(FailedAgent::in_this_process(error, SensorConfig::NONE)),
         };
         Some(Helper { agent, grants: self.grants })
     }

@@ -19,7 +19,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::action::to_object;
-use crate::error::{failure, from_env, mistake, no_attribute, no_such, poisoned};
+use crate::error::{failure, from_env, mistake, no_attribute, no_such, not_picklable, poisoned};
 use crate::observation::{Briefing, Observation, plain};
 use crate::options::{perception, rule_set};
 
@@ -119,6 +119,10 @@ impl PlanningAgent {
     /// Raises `AttributeError`; the message names the new name of a renamed method.
     fn __getattr__(&self, name: &str) -> PyResult<Py<PyAny>> {
         Err(no_attribute("PlanningAgent", name, &[("senses", "sensors")]))
+    }
+
+    fn __reduce__(&self) -> PyResult<Py<PyAny>> {
+        Err(not_picklable("PlanningAgent", "create another one with the same arguments"))
     }
 }
 
@@ -314,6 +318,10 @@ impl Planner {
             ("things", "remembered_objects"),
         ];
         Err(no_attribute("Planner", name, &RENAMED))
+    }
+
+    fn __reduce__(&self) -> PyResult<Py<PyAny>> {
+        Err(not_picklable("Planner", "create another one with the same arguments"))
     }
 
     /// Returns the remembered objects: `name`, `class`, `position` in the world (meters), `last_seen` (frame), and

@@ -18,7 +18,8 @@ use pythonize::depythonize;
 use crate::action;
 use crate::episode::{Episode, encode_png};
 use crate::error::{
-    ANY_NUMBER, agent_number, failure, from_env, integer, mistake, no_attribute, poisoned,
+    ANY_NUMBER, agent_number, failure, from_env, integer, mistake, no_attribute, not_picklable,
+    poisoned,
 };
 use crate::observation::{Briefing, Observation, arrays, plain};
 use crate::options::{IMAGE_SIZES, Options, sensors, strings};
@@ -402,6 +403,11 @@ impl World {
     fn __repr__(&mut self) -> PyResult<String> {
         let frame = self.frame()?;
         Ok(format!("World({:?}, frame={frame})", self.episode.id()))
+    }
+
+    fn __reduce__(&self) -> PyResult<Py<PyAny>> {
+        let instead = "pass its Episode to another process, and use snapshot() within this one";
+        Err(not_picklable("World", instead))
     }
 }
 

@@ -81,6 +81,8 @@ struct Fuzzed {
 /// Input that is being parsed, for the watchdog.
 #[derive(Default)]
 struct Current {
+    /// Corpus of the parser.
+    folder: PathBuf,
     input: Vec<u8>,
     began: Option<Instant>,
 }
@@ -98,7 +100,7 @@ pub fn run_all(options: &FuzzOptions) -> Result<bool> {
     let dir = tempfile::tempdir().context("no temporary folder")?;
     let inputs = Inputs::new(dir.path())?;
     let current = Arc::new(Mutex::new(Current::default()));
-    watch(Arc::clone(&current), options.corpus.clone());
+    watch(Arc::clone(&current));
     report_other_panics(Arc::clone(&current));
     let mut n_failures = 0;
     println!("{HEAD}");
@@ -139,16 +141,17 @@ fn report_other_panics(current: Arc<Mutex<Current>>) {
     }));
 }
 
-/// Ends the process when one input takes too long.
-fn watch(current: Arc<Mutex<Current>>, corpus: PathBuf) {
+/// Ends the process when one input takes too long. The input joins the corpus of its parser.
+fn watch(current: Arc<Mutex<Current>>) {
     std::thread::spawn(move || {
         loop {
             std::thread::sleep(Duration::from_secs(1));
             let current = current.lock().unwrap_or_else(PoisonError::into_inner);
             if current.began.is_some_and(|began| began.elapsed() > MAX_DURATION) {
-                let path = corpus.join("hang");
-                let written = fs::write(&path, &current.input);
-                eprintln!("an input hangs; it is in {} ({written:?})", path.display());
+                match keep(&current.folder, &current.input) {
+                    Ok(path) => eprintln!("an input hangs; it is in {path}"),
+                    Err(error) => eprintln!("an input hangs and can't be kept: {error:#}"),
+                }
                 process::exit(1);
             }
         }
@@ -162,6 +165,7 @@ fn fuzz(
     current: &Mutex<Current>,
 ) -> Result<Fuzzed> {
     let folder = options.corpus.join(target.name);
+    current.lock().unwrap_or_else(PoisonError::into_inner).folder = folder.clone();
     let seeds = (target.seeds)(inputs).with_context(|| format!("parser {}", target.name))?;
     let mut kept = corpus(&folder)?;
     let mut pool = seeds.clone();

@@ -33,6 +33,15 @@ pub const MAX_PATH_BYTES: usize = 200;
 /// Maximum number of names in a path.
 pub const MAX_DEPTH: usize = 8;
 
+/// Folder in which Python keeps bytecode. Its files depend on times and on the version of Python, and
+/// appear when a program starts without a sandbox, so archives and digests leave them out.
+const BYTECODE: &str = "__pycache__";
+
+/// End of the names of folders in which pip describes packages.
+const PACKAGE_DESCRIPTION: &str = ".dist-info";
+/// File in such a folder with the place that a package was installed from, such as a path of the author.
+const PACKAGE_ORIGIN: &str = "direct_url.json";
+
 /// Extracts an archive into a new folder. The folder appears complete or not at all, also after a power
 /// failure.
 ///

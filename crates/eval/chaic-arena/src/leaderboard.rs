@@ -171,7 +171,9 @@ fn conflict(earlier: &ConfirmedEntry, entry: &ConfirmedEntry) -> Option<String> 
     }
     let played: BTreeMap<(&str, &RunKey), &EpisodeRunRecord> =
         earlier.score.records().map(|(partner, run)| ((partner, &run.key), run)).collect();
-    let is_own = |run: &EpisodeRunRecord| [&a.name, &b.name].contains(&&run.key.helper);
+    // Names of built-in helpers are taken, so a helper of one submission that also played in the other is
+    // built in, unless both submissions have its name.
+    let is_own = |run: &EpisodeRunRecord| a.name == b.name && run.key.helper == a.name;
     let (partner, differing) =
         entry.score.records().filter(|(_, run)| !is_own(run)).find(|(partner, run)| {
             played

@@ -274,11 +274,6 @@ impl NewRun {
         }
         let options = request.new_options()?;
         check_options(&options, helpers)?;
-        for helper in &options.helpers {
-            for task in &options.tasks {
-                helpers.check_task(helper, *task).map_err(EvalError::Options)?;
-            }
-        }
         let source = request.episodes.as_ref();
         let episodes = source.map(|s| plan::read_source(s, &options)).transpose()?;
         let planned = plan::plan(&options, episodes.as_deref().unwrap_or_default())?;
@@ -301,7 +296,8 @@ impl NewRun {
         }
         helpers.attach_run(folder.path())?;
         let granted = RunGrants::new(&self.options, helpers)?;
-        folder.write_options(&self.options, &granted)?;
+        let images = granted.requested_images(&self.options, helpers)?;
+        folder.write_options(&self.options, &granted, images)?;
         Ok((self.options, granted, self.planned))
     }
 }
@@ -320,12 +316,21 @@ fn resume(
     let planned = plan::planned(folder, &options)?;
     let granted = RunGrants::new(&options, helpers)?;
     folder.check_grants(&granted)?;
+    folder.check_images(granted.requested_images(&options, helpers)?.as_ref())?;
     helpers.attach_run(folder.path())?;
     Ok((options, granted, planned))
 }
 
+/// Checks that helpers and partner exist, that the track allows them, and that every helper can play every
+/// task.
 fn check_options(options: &RunOptions, helpers: &dyn HelperRegistry) -> Result<()> {
-    RunGrants::new(options, helpers).map(drop)
+    RunGrants::new(options, helpers)?;
+    for helper in &options.helpers {
+        for task in &options.tasks {
+            helpers.check_task(helper, *task).map_err(EvalError::Options)?;
+        }
+    }
+    Ok(())
 }
 
 /// Returns the names that `--helper` accepts.

@@ -39,6 +39,17 @@ pub(crate) const ROLLOUT_BOUNDS: BoundTable = &[
     ("validation_episodes", integer(1, MAX_VALIDATION_EPISODES)),
     ("rewards", Bound::Table(REWARD_BOUNDS)),
 ];
+/// Keys of [`RolloutConfig`] on which the inputs of a policy and the scores of its validations depend.
+pub(crate) const ROLLOUT_FIXED_KEYS: &[&str] = &[
+    "rollout.tasks",
+    "rollout.splits",
+    "rollout.validation_episodes",
+    "rollout.image_size",
+    "rollout.perception",
+    "rollout.behavior",
+    "rollout.infer_hint",
+    "rollout.n_past_decisions",
+];
 /// Maximum number of validation episodes per task; more take days.
 pub(crate) const MAX_VALIDATION_EPISODES: i64 = 1000;
 /// Bounds of the reward weights; larger returns exceed the range of the value head.

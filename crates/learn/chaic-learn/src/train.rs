@@ -22,7 +22,9 @@ use crate::opponent::network::OpponentModel;
 use crate::policy_kind::{PolicyKind, PolicyWeights};
 use crate::ppo::{PPO_BOUNDS, PpoConfig, Schedule, update};
 use crate::rollout::rollout_all;
-use crate::rollout_config::{ROLLOUT_BOUNDS, VALIDATION_TR, Validation, mean_tr};
+use crate::rollout_config::{
+    ROLLOUT_BOUNDS, ROLLOUT_FIXED_KEYS, VALIDATION_TR, Validation, mean_tr,
+};
 
 mod imitation;
 
@@ -134,6 +136,8 @@ pub trait Algorithm: Clone + Default + Serialize + DeserializeOwned {
     const KIND: &'static str;
     /// Bounds of every number.
     const BOUNDS: BoundTable;
+    /// Keys on which the data of an algorithm depends, see [`Trainer::fixed_keys`].
+    const FIXED_KEYS: &'static [&'static str] = &[];
 
     /// Returns the settings that all algorithms share.
     fn spec(&self) -> TrainingSpec<'_>;
@@ -239,6 +243,10 @@ impl<A: Algorithm> Trainer for PolicyTrainer<A> {
             return Err(WeightsError::Configuration(problem.to_owned()));
         }
         Ok(parameters)
+    }
+
+    fn fixed_keys() -> Vec<&'static str> {
+        [ROLLOUT_FIXED_KEYS, A::FIXED_KEYS].concat()
     }
 
     fn network(&self) -> &Network {

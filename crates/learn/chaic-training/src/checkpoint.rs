@@ -229,6 +229,17 @@ impl Checkpoint {
     /// # Errors
     /// Any [`CheckpointError`]. Memory in use stays within a small multiple of the file's size.
     pub fn from_bytes(bytes: &[u8], identity: &Identity) -> Result<Checkpoint, CheckpointError> {
+        let (checkpoint, network) = Checkpoint::of_kind(bytes, &identity.kind)?;
+        if network != identity.network {
+            return Err(CheckpointError::Network);
+        }
+        checkpoint.check_finite()?;
+        Ok(checkpoint)
+    }
+
+    /// Reads the content of a checkpoint file of this kind of training and of any network. Returns the
+    /// digest of the network too. Values are not checked.
+    pub(crate) fn of_kind(bytes: &[u8], kind: &str) -> Result<(Checkpoint, u128), CheckpointError> {
         let damaged = |problem: &str| CheckpointError::Damaged(problem.to_owned());
         let Some((head, body)) = bytes.split_at_checked(BODY_AT) else {
             return Err(damaged("it is cut off, or of format version 1, which is no longer read"));
@@ -250,16 +261,10 @@ impl Checkpoint {
         let Ok(((found, sections), [])) = postcard::take_from_bytes::<Body>(body) else {
             return Err(damaged("its sections cannot be read"));
         };
-        if found.kind != identity.kind {
-            let expected = identity.kind.clone();
-            return Err(CheckpointError::Kind { found: found.kind, expected });
+        if found.kind != kind {
+            return Err(CheckpointError::Kind { found: found.kind, expected: kind.to_owned() });
         }
-        if found.network != identity.network {
-            return Err(CheckpointError::Network);
-        }
-        let checkpoint = Checkpoint { sections };
-        checkpoint.check_finite()?;
-        Ok(checkpoint)
+        Ok((Checkpoint { sections }, found.network))
     }
 
     fn check_finite(&self) -> Result<(), CheckpointError> {

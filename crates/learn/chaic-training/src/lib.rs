@@ -3,7 +3,8 @@
 //! **What it is**: [`learner`] has the parameters of a network during training and data-parallel
 //! optimizer steps. [`trainer`] is the interface of trainings. [`run`] has the training folder:
 //! configuration, checkpoints, curves and weights. [`checkpoint`] has the checkpoint format,
-//! [`bounds`] the bounds of configurations, [`conformance`] the tests that every trainer passes.
+//! [`settings`] the settings that a resumed training may not change, [`bounds`] the bounds of
+//! configurations, [`conformance`] the tests that every trainer passes.
 //!
 //! **What it is not**: it knows no data, losses, worlds or tasks, and it prints nothing.
 //!
@@ -20,6 +21,7 @@ pub mod conformance;
 pub mod curves;
 pub mod learner;
 pub mod run;
+pub mod settings;
 pub mod trainer;
 
 pub use checkpoint::{Checkpoint, CheckpointError};
@@ -27,4 +29,5 @@ pub use config::{parse_config, read_config, read_config_with};
 pub use curves::{CURVES, CurveRecord, Metrics, Phase, defined_metrics, metrics};
 pub use learner::{Learner, learning_rate_at};
 pub use run::{CHECKPOINT, CONFIG, INITIAL_WEIGHTS, TrainingRun};
+pub use settings::{Settings, changed_setting};
 pub use trainer::{Trainer, TrainingError};

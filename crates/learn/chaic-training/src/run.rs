@@ -9,12 +9,12 @@ use chaic_files::{
     EntryKind, FolderLock, LOCK, TEMPORARY_SUFFIX, create_folders, entries, kind, read_bounded,
     read_user_file, remove_empty_folder, remove_file, remove_folder, write_atomically,
 };
-use chaic_nn::Network;
 use chaic_nn::weights::WeightsError;
 
 use crate::checkpoint::{Checkpoint, CheckpointError, Identity, Section};
 use crate::config::{check_config, config_text, read_written_config};
 use crate::curves::{self, CurveRecord, Metrics, Phase, Position};
+use crate::settings::{self, Settings, changed_setting};
 use crate::trainer::{Trainer, TrainingError};
 
 /// Name of the configuration file.
@@ -45,10 +45,13 @@ pub struct TrainingRun<T> {
     validation_is_due: bool,
     /// Highest value so far of the metric [`Trainer::SCORE`].
     best_score: Option<f64>,
+    /// Values of [`Trainer::fixed_keys`].
+    settings: Settings,
     _lock: FolderLock,
 }
 
-/// Returns the content of a checkpoint file, with the metrics of the steps since the last record.
+/// Returns the content of a checkpoint file, with the metrics of the steps since the last record. It
+/// records no settings, as those of earlier builds.
 ///
 /// # Errors
 /// If a value is not finite.
@@ -83,6 +86,17 @@ pub fn restore<T: Trainer>(
 
 pub(crate) fn identity<T: Trainer>(trainer: &T) -> Identity {
     Identity::new(T::KIND, trainer.network())
+}
+
+/// Returns a message about a setting whose value differs from that in the content of a checkpoint file;
+/// `None` if there is no such setting.
+fn changed_since<T: Trainer>(
+    bytes: &[u8],
+    current: &Settings,
+) -> Result<Option<String>, CheckpointError> {
+    let (checkpoint, _) = Checkpoint::of_kind(bytes, T::KIND)?;
+    let recorded = settings::recorded(&checkpoint)?;
+    Ok(changed_setting(&recorded, current, "the training began"))
 }
 
 /// Checks that the training data is that with which the training began.
@@ -192,7 +206,8 @@ impl<T: Trainer> TrainingRun<T> {
         let lock = FolderLock::acquire(folder)?;
         // Another process may have started between the first check and the lock.
         check_is_empty(folder)?;
-        let started = start_locked::<T>(folder, config, weights, progress, stop)
+        let settings = settings::values(config, &T::fixed_keys());
+        let started = start_locked::<T>(folder, config, &settings, weights, progress, stop)
             .map_err(|error| clean_up_failed_start(folder, T::DATA, is_new, error))?;
         Ok(started.map(|trainer| TrainingRun {
             folder: folder.to_owned(),
@@ -200,6 +215,7 @@ impl<T: Trainer> TrainingRun<T> {
             pending_metrics: Vec::new(),
             validation_is_due: false,
             best_score: None,
+            settings,
             _lock: lock,
         }))
     }
@@ -208,7 +224,7 @@ impl<T: Trainer> TrainingRun<T> {
     ///
     /// # Errors
     /// If the folder holds no training, files cannot be read, are damaged or belong to another
-    /// training, the training data has changed, or the folder is in use.
+    /// training, the training data or a fixed setting has changed, or the folder is in use.
     pub fn resume(
         folder: &Path,
         progress: &mut dyn FnMut(&str),
@@ -230,13 +246,20 @@ impl<T: Trainer> TrainingRun<T> {
         if bytes.is_none() && curves::has_lines(folder) {
             return Err(TrainingError::NoCheckpoint(path));
         }
+        let checkpoint_error = |problem| TrainingError::Checkpoint { path: path.clone(), problem };
+        let settings = settings::values(&config, &T::fixed_keys());
+        if let Some(bytes) = &bytes {
+            // Other settings may have other data or another network, so this comes first.
+            let problem = changed_since::<T>(bytes, &settings).map_err(checkpoint_error)?;
+            if let Some(problem) = problem {
+                return Err(TrainingError::Config { path: folder.join(CONFIG), problem });
+            }
+        }
         let Some(mut trainer) = T::new(&config, folder, progress, stop)? else { return Ok(None) };
         let (mut pending_metrics, mut validation_is_due, mut best_score) =
             (Vec::new(), false, None);
         match bytes {
             Some(bytes) => {
-                let checkpoint_error =
-                    |problem| TrainingError::Checkpoint { path: path.clone(), problem };
                 let restored = restore(&mut trainer, &bytes, stop).map_err(checkpoint_error)?;
                 let Some(checkpoint) = restored else { return Ok(None) };
                 (pending_metrics, validation_is_due, best_score) =
@@ -249,7 +272,7 @@ impl<T: Trainer> TrainingRun<T> {
                     trainer
                         .load_parameters(read_weights::<T>(&config, &initial, bytes)?.parameters);
                 }
-                write_initial_checkpoint(&trainer, folder)?;
+                write_initial_checkpoint(&trainer, &settings, folder)?;
             }
         }
         let phase = if validation_is_due { Phase::Train } else { Phase::Validation };
@@ -266,6 +289,7 @@ impl<T: Trainer> TrainingRun<T> {
             pending_metrics,
             validation_is_due,
             best_score,
+            settings,
             _lock: lock,
         }))
     }
@@ -325,8 +349,8 @@ impl<T: Trainer> TrainingRun<T> {
         Ok(true)
     }
 
-    /// Validates, records the metrics, and writes the weights unless earlier ones have a higher
-    /// score; returns whether it was completed.
+    /// Validates, records the metrics, and writes the weights, unless earlier ones have a score and
+    /// these have no higher one; returns whether it was completed.
     fn validate(
         &mut self,
         stop: &AtomicBool,
@@ -339,7 +363,7 @@ impl<T: Trainer> TrainingRun<T> {
         let Some((metrics, weights)) = validated else { return Ok(false) };
         check_finite(&metrics, step)?;
         let score = T::SCORE.and_then(|name| metrics.get(name).copied());
-        let is_best = score.is_none_or(|score| self.best_score.is_none_or(|best| score > best));
+        let is_best = self.best_score.is_none_or(|best| score.is_some_and(|score| score > best));
         if is_best {
             write_atomically(&self.folder.join(T::WEIGHTS), &weights)?;
         }
@@ -354,8 +378,9 @@ impl<T: Trainer> TrainingRun<T> {
 
     fn write_checkpoint(&self) -> Result<(), TrainingError> {
         let (is_due, best_score) = (self.validation_is_due, self.best_score);
-        let checkpoint =
+        let mut checkpoint =
             complete_checkpoint(&self.trainer, &self.pending_metrics, is_due, best_score);
+        settings::record(&self.settings, &mut checkpoint);
         let step = self.steps_done();
         let bytes = checkpoint
             .to_bytes(&identity(&self.trainer))
@@ -400,6 +425,7 @@ fn read_weights<T: Trainer>(
 fn start_locked<T: Trainer>(
     folder: &Path,
     config: &T::Config,
+    settings: &Settings,
     weights: Option<InitialWeights>,
     progress: &mut dyn FnMut(&str),
     stop: &AtomicBool,
@@ -418,15 +444,21 @@ fn start_locked<T: Trainer>(
     if let Some(weights) = weights {
         trainer.load_parameters(weights.parameters);
     }
-    write_initial_checkpoint(&trainer, folder)?;
+    write_initial_checkpoint(&trainer, settings, folder)?;
     Ok(Some(trainer))
 }
 
 /// Writes the checkpoint of a training before its first step. Curves without a checkpoint mean that it
 /// is lost.
-fn write_initial_checkpoint<T: Trainer>(trainer: &T, folder: &Path) -> Result<(), TrainingError> {
+fn write_initial_checkpoint<T: Trainer>(
+    trainer: &T,
+    settings: &Settings,
+    folder: &Path,
+) -> Result<(), TrainingError> {
     let path = folder.join(CHECKPOINT);
-    let bytes = match checkpoint_bytes(trainer, &[]) {
+    let mut checkpoint = complete_checkpoint(trainer, &[], false, None);
+    settings::record(settings, &mut checkpoint);
+    let bytes = match checkpoint.to_bytes(&identity(trainer)) {
         Ok(bytes) => bytes,
         Err(problem) => return Err(TrainingError::Checkpoint { path, problem }),
     };
@@ -454,9 +486,7 @@ fn check_is_empty(folder: &Path) -> Result<(), TrainingError> {
 /// of this kind or cannot be read.
 fn other_kind<T: Trainer>(folder: &Path) -> Option<TrainingError> {
     let bytes = read_bounded(&folder.join(CHECKPOINT), MAX_BYTES).ok()?;
-    // The kind is compared before the network, which is unknown without a configuration.
-    let identity = Identity::new(T::KIND, &Network::default());
-    match Checkpoint::from_bytes(&bytes, &identity) {
+    match Checkpoint::of_kind(&bytes, T::KIND) {
         Err(CheckpointError::Kind { found, expected }) => {
             Some(TrainingError::OtherKind { path: folder.to_owned(), found, expected })
         }

@@ -34,7 +34,7 @@ pub trait Trainer: Sized {
     /// Number of steps between two validations.
     const VALIDATION_STEPS: u64 = 1000;
     /// Validation metric of which the weights with the highest value are kept; `None` to keep those
-    /// of the last validation.
+    /// of the last validation. Weights without a value are kept until a validation has one.
     const SCORE: Option<&'static str> = None;
     /// Key of the configuration that names the data of [`Trainer::input_digest`]; empty if there is none.
     const INPUT_KEY: &'static str = "";
@@ -69,6 +69,13 @@ pub trait Trainer: Sized {
     /// # Errors
     /// If the file does not fit the network, or a value is not finite.
     fn read_weights(config: &Self::Config, weights: &[u8]) -> Result<Vec<f32>, WeightsError>;
+
+    /// Returns the keys of the configuration on which data of the folder, recorded positions or the best
+    /// score depend, such as `rollout.tasks`. A training is resumed only with the same values. Each key has
+    /// a value in every configuration; that of a table stands for all of its keys.
+    fn fixed_keys() -> Vec<&'static str> {
+        Vec::new()
+    }
 
     /// Returns the trained network.
     fn network(&self) -> &Network;

@@ -9,6 +9,10 @@ use crate::grid::neighbors;
 
 /// Marker of a cell without a room.
 pub(crate) const NO_ROOM: u8 = u8::MAX;
+
+// Every room of a setup that a world accepts has a lamp.
+const _: () = assert!(Setup::MAX_ROOMS <= NO_ROOM as usize);
+
 /// Reach of contact shadows, meters.
 const CONTACT_SHADOW_M: f32 = 0.22;
 /// Maximum number of cells along one side; cells of a house are a few centimeters wide.

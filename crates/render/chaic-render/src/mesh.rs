@@ -167,7 +167,7 @@ impl Mesh {
     /// Maximum number of vertices: indices have 16 bits.
     const MAX_VERTICES: usize = 65_000;
     /// Maximum number of materials: indices have 8 bits.
-    const MAX_MATERIALS: usize = 255;
+    pub const MAX_MATERIALS: usize = 255;
 
     /// Begins a new material for the triangles that follow. In a full list, an equal material is
     /// used again, as in long walls with many windows; without one, the current material stays.
@@ -179,6 +179,37 @@ impl Mesh {
         } else if let Some(k) = self.materials.iter().position(|m| *m == material) {
             self.material = k as u8;
         }
+    }
+
+    /// Appends another mesh and returns true, or changes nothing and returns false if the result
+    /// would exceed the maximum number of vertices, triangles or materials.
+    pub fn append(&mut self, other: &Mesh) -> bool {
+        let (n_vertices, n_triangles) = (self.positions.len(), self.triangles.len());
+        let n_free = Mesh::MAX_MATERIALS.saturating_sub(self.materials.len());
+        let (new, others) = other.materials.split_at(n_free.min(other.materials.len()));
+        let is_known = |m: &Material| self.materials.contains(m) || new.contains(m);
+        if n_vertices + other.positions.len() > Mesh::MAX_VERTICES
+            || n_triangles + other.triangles.len() > Mesh::MAX_VERTICES
+            || !others.iter().all(is_known)
+        {
+            return false;
+        }
+        let mut materials = Vec::with_capacity(other.materials.len());
+        for material in &other.materials {
+            self.set_material(*material);
+            materials.push(self.material);
+        }
+        self.positions.extend_from_slice(&other.positions);
+        self.normals.extend_from_slice(&other.normals);
+        for (triangle, face) in other.triangles.iter().zip(&other.faces) {
+            self.material = materials[usize::from(triangle.material)];
+            let vertices = triangle.vertices.map(|k| n_vertices + usize::from(k));
+            self.triangle(vertices, triangle.smooth);
+            if let Some(last) = self.faces.last_mut() {
+                *last = n_triangles as u16 + face;
+            }
+        }
+        true
     }
 
     /// Computes the bounding box; call it after the last triangle.
@@ -314,6 +345,40 @@ mod tests {
         for (k, triangle) in mesh.triangles.iter().enumerate() {
             assert_eq!(mesh.materials[usize::from(triangle.material)], color(k), "{k}");
         }
+    }
+
+    #[test]
+    fn a_mesh_is_appended_completely_or_not_at_all() {
+        let quad = |colors: &[u8]| {
+            let mut mesh = Mesh::default();
+            for [x, y] in [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]] {
+                mesh.vertex(Vec3::new(x, y, 0.0), Vec3::Y);
+            }
+            for color in colors {
+                mesh.set_material(Material::new([*color, 0, 0], Finish::Matte));
+                mesh.quad([0, 1, 2, 3], false);
+            }
+            mesh
+        };
+        let mut mesh = quad(&[1]);
+        assert!(mesh.append(&quad(&[2, 3])));
+        let vertices: Vec<u16> = mesh.triangles.iter().map(|t| t.vertices[0]).collect();
+        assert_eq!(vertices, [0, 0, 4, 4, 4, 4]);
+        assert_eq!(mesh.faces, [0, 0, 2, 2, 4, 4]);
+        let materials: Vec<u8> = mesh.triangles.iter().map(|t| t.material).collect();
+        assert_eq!(materials, [0, 0, 1, 1, 2, 2]);
+        assert_eq!((mesh.positions.len(), mesh.normals.len(), mesh.indices[2].len()), (8, 8, 6));
+        while mesh.materials.len() < Mesh::MAX_MATERIALS {
+            assert!(mesh.append(&quad(&[3])));
+        }
+        let n = mesh.triangles.len();
+        assert!(!mesh.append(&quad(&[3, 4])), "a material does not fit");
+        assert_eq!((mesh.triangles.len(), mesh.materials.len()), (n, Mesh::MAX_MATERIALS));
+        assert!(mesh.append(&quad(&[1, 3])), "equal materials are used again");
+        while mesh.positions.len() + 4 <= Mesh::MAX_VERTICES {
+            assert!(mesh.append(&quad(&[3])));
+        }
+        assert!(!mesh.append(&quad(&[3])), "vertices do not fit");
     }
 
     #[test]

@@ -7,7 +7,7 @@
 use chaic_core::catalogue::Finish;
 use chaic_core::geom::Rect;
 use chaic_core::{AgentId, EntityId, Vec3};
-use chaic_world::{FloorMaterial, Room, RoomKind, Setup, subtract_rect};
+use chaic_world::{FloorMaterial, Room, RoomKind, Setup};
 use glam::Mat3;
 
 use crate::mesh::{self, Material, Mesh};
@@ -28,7 +28,8 @@ pub(crate) fn meshes(setup: &Setup) -> Vec<(EntityId, Mesh)> {
     }
     let wall_materials = walls::wall_materials(setup);
     for wall in &setup.walls {
-        structure.push((EntityId::WALL, walls::mesh(setup, wall, &wall_materials)));
+        let meshes = walls::meshes(setup, wall, &wall_materials);
+        structure.extend(meshes.into_iter().map(|m| (EntityId::WALL, m)));
     }
     for opening in setup.openings.iter().take(MAX_PIECES) {
         let meshes = joinery::door_frame(setup, opening).into_iter().flatten();
@@ -36,7 +37,8 @@ pub(crate) fn meshes(setup: &Setup) -> Vec<(EntityId, Mesh)> {
         structure.extend(meshes.map(|m| (EntityId::WALL, m)));
     }
     if let Some(height) = setup.ceiling_m {
-        for rect in ceiling_pieces(setup) {
+        // As with floors, only a setup that no world accepts has too many pieces.
+        for rect in setup.ceiling_pieces().unwrap_or_default() {
             structure.push((EntityId::CEILING, ceiling_mesh(&rect, height)));
         }
         for room in indoors(setup).take(MAX_PIECES) {
@@ -50,44 +52,21 @@ fn indoors(setup: &Setup) -> impl Iterator<Item = &Room> {
     setup.rooms.iter().filter(|r| r.kind != RoomKind::Outdoors)
 }
 
-/// Maximum number of pieces of ceiling, frames or lamps; it limits the work on invalid input.
+/// Maximum number of frames or lamps; it limits the work on invalid input.
 const MAX_PIECES: usize = 4096;
 
 // Visibility ids name every instance of a setup that a world accepts: floors, walls, both parts of
 // door frames, ceilings in and between rooms, lamps, people and objects.
 const _: () = assert!(
     Setup::MAX_FLOOR_PIECES
-        + Setup::MAX_WALLS
+        + walls::MAX_MESHES
         + 2 * Setup::MAX_OPENINGS
-        + (Setup::MAX_ROOMS + MAX_PIECES)
+        + (Setup::MAX_ROOMS + Setup::MAX_CEILING_PIECES)
         + Setup::MAX_ROOMS
         + AgentId::MAX_AGENTS
         + Setup::MAX_THINGS
         < 0xffff
 );
-
-/// Ceilings of rooms, and of the area between them and the outermost walls: doorways and alcoves
-/// belong to no room.
-fn ceiling_pieces(setup: &Setup) -> Vec<Rect> {
-    /// Overlap of ceilings with walls, meters: rooms end at the faces of walls.
-    const WALL_OVERLAP_M: f32 = 0.15;
-    let rooms = setup.rooms.iter().filter(|r| r.kind != RoomKind::Outdoors);
-    let mut pieces: Vec<Rect> = rooms.map(|r| r.rect.expanded(WALL_OVERLAP_M)).collect();
-    let ends = setup.walls.iter().flat_map(|w| [w.a, w.b]);
-    let house = ends.fold(setup.bounds, |r, p| Rect { min: r.min.min(p), max: r.max.max(p) });
-    let mut between = vec![house];
-    for room in &pieces {
-        let mut remaining = Vec::new();
-        for rect in between {
-            subtract_rect(&rect, room, |piece| remaining.push(piece));
-        }
-        remaining.truncate(MAX_PIECES);
-        between = remaining;
-    }
-    // They overlap the ceilings of rooms by a millimeter, so that no pixel falls between them.
-    pieces.extend(between.iter().map(|r| r.expanded(0.001)));
-    pieces
-}
 
 fn floor_mesh(rect: &Rect, floor_material: FloorMaterial, color: [u8; 3]) -> Mesh {
     // Neighbors overlap by a millimeter, so that no pixel falls between them.
@@ -182,7 +161,7 @@ mod tests {
 
     #[test]
     fn there_is_a_ceiling_over_every_room_and_doorway() {
-        let pieces = ceiling_pieces(&two_rooms());
+        let pieces = two_rooms().ceiling_pieces().expect("few enough");
         for i in 0..50 {
             for k in 0..40 {
                 let p = 0.1 * Vec2::new(i as f32 + 0.5, k as f32 + 0.5);
@@ -213,7 +192,8 @@ mod tests {
             .walls
             .iter()
             .map(|w| {
-                let mesh = walls::mesh(&setup, w, &wall_materials);
+                let meshes = walls::meshes(&setup, w, &wall_materials);
+                let [mesh] = &meshes[..] else { panic!("{} meshes", meshes.len()) };
                 let wall_frame = WallFrame::new(w);
                 for p in &mesh.positions {
                     let d = Vec2::new(p.x, p.z) - wall_frame.center;
@@ -225,5 +205,44 @@ mod tests {
             .collect();
         // The other walls are interior walls; one of them borders an alcove.
         assert_eq!(has_window, [false, false, false, true]);
+    }
+
+    /// A row of living rooms along one outer wall, `gap_m` apart.
+    fn row_of_rooms(n: usize, width_m: f32, gap_m: f32) -> Setup {
+        let room = |k: usize| {
+            let x = (width_m + gap_m) * k as f32;
+            Room { kind: RoomKind::LivingRoom, rect: Rect::new([x, 0.0], [x + width_m, 4.0]) }
+        };
+        let length_m = (width_m + gap_m) * n as f32 - gap_m;
+        let mut setup = two_rooms();
+        setup.walls.truncate(1);
+        setup.walls[0].a = Vec2::new(0.0, -0.25);
+        setup.walls[0].b = Vec2::new(length_m, -0.25);
+        Setup { rooms: (0..n).map(room).collect(), ..setup }
+    }
+
+    #[test]
+    fn long_walls_have_all_windows_and_the_paint_of_every_room() {
+        for (n, width_m, gap_m, n_windows) in [(60, 16.0, 0.0, 6), (200, 4.0, 0.2, 1)] {
+            let setup = row_of_rooms(n, width_m, gap_m);
+            let wall_materials = walls::wall_materials(&setup);
+            let axes = WallFrame::new(&setup.walls[0]).axes();
+            let (mut n_pane, mut n_painted) = (vec![0; n], vec![0; n]);
+            for mesh in walls::meshes(&setup, &setup.walls[0], &wall_materials) {
+                assert_eq!(mesh.min.y, 0.0, "a map would leave it out");
+                for triangle in &mesh.triangles {
+                    let corners = triangle.vertices.map(|k| mesh.positions[usize::from(k)]);
+                    let x = corners.iter().map(|p| p.x).sum::<f32>() / 3.0;
+                    let k = ((x / (width_m + gap_m)) as usize).min(n - 1);
+                    let material = mesh.materials[usize::from(triangle.material)];
+                    let is_inner = corners.iter().all(|p| p.z.abs() < 1e-3);
+                    let has_paint = |m: &Material| material == m.with_axes(axes);
+                    n_pane[k] += usize::from(material.gloss == mesh::SpecularPreset::Pane);
+                    n_painted[k] += usize::from(is_inner && has_paint(&wall_materials[k]));
+                }
+            }
+            assert_eq!(n_pane, vec![12 * n_windows; n], "triangles of panes per room");
+            assert!(n_painted.iter().all(|n| *n >= 2), "{n_painted:?}");
+        }
     }
 }

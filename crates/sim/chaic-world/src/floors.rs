@@ -1,8 +1,9 @@
-//! Parts of overlapping floors that are visible from above.
+//! Floors and ceilings in rectangles: parts of overlapping floors that are visible from above, and
+//! ceilings in and between rooms.
 
 use chaic_core::geom::Rect;
 
-use crate::setup::{Floor, Setup};
+use crate::setup::{Floor, RoomKind, Setup};
 
 impl Setup {
     /// Maximum number of [`Setup::floor_pieces`]; each is a mesh of its own. Our choice: far more
@@ -28,10 +29,39 @@ impl Setup {
         }
         Some(pieces)
     }
+
+    /// Maximum number of rectangles of ceiling between rooms, as [`Setup::MAX_FLOOR_PIECES`].
+    pub const MAX_CEILING_PIECES: usize = 4096;
+
+    /// Returns the ceilings of rooms, and of the area between them and the outermost walls:
+    /// doorways and alcoves belong to no room. Returns `None` if there are more than
+    /// [`Setup::MAX_CEILING_PIECES`] between rooms.
+    pub fn ceiling_pieces(&self) -> Option<Vec<Rect>> {
+        /// Overlap of ceilings with walls, meters: rooms end at the faces of walls.
+        const WALL_OVERLAP_M: f32 = 0.15;
+        let rooms = self.rooms.iter().filter(|r| r.kind != RoomKind::Outdoors);
+        let mut pieces: Vec<Rect> = rooms.map(|r| r.rect.expanded(WALL_OVERLAP_M)).collect();
+        let ends = self.walls.iter().flat_map(|w| [w.a, w.b]);
+        let house = ends.fold(self.bounds, |r, p| Rect { min: r.min.min(p), max: r.max.max(p) });
+        let mut between = vec![house];
+        for room in &pieces {
+            let mut remaining = Vec::new();
+            for rect in between {
+                subtract_rect(&rect, room, |piece| remaining.push(piece));
+            }
+            if remaining.len() > Setup::MAX_CEILING_PIECES {
+                return None;
+            }
+            between = remaining;
+        }
+        // They overlap the ceilings of rooms by a millimeter, so that no pixel falls between them.
+        pieces.extend(between.iter().map(|r| r.expanded(0.001)));
+        Some(pieces)
+    }
 }
 
 /// Calls `keep` with the parts of `rect` outside of `hole`, at most four.
-pub fn subtract_rect(rect: &Rect, hole: &Rect, mut keep: impl FnMut(Rect)) {
+fn subtract_rect(rect: &Rect, hole: &Rect, mut keep: impl FnMut(Rect)) {
     let (low, high) = (rect.min.max(hole.min), rect.max.min(hole.max));
     if low.x >= high.x || low.y >= high.y {
         keep(*rect);

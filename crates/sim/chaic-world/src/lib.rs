@@ -39,7 +39,6 @@ mod view;
 mod world;
 
 pub use event::{Event, EventKind};
-pub use floors::subtract_rect;
 pub use posture::{Arm, Posture};
 pub use rules::{Blocking, Durations, JointLift, ReachTo, Rules};
 pub use setup::{

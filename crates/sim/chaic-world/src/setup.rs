@@ -293,9 +293,13 @@ impl Setup {
     pub const MAX_LENGTH_M: f32 = 200.0;
     /// Maximum number of walls in one episode.
     pub const MAX_WALLS: usize = 4096;
+    /// Maximum total length of all walls, meters. Our choice: walls two meters apart in both
+    /// directions over the largest bounds have 40 km, and a wall has a window every few meters.
+    pub const MAX_WALL_LENGTH_M: f32 = 100_000.0;
     /// Maximum number of rooms in one episode. Our choice: far more than any generated or imported
-    /// house has, and small enough for a linear search of the room at a point.
-    pub const MAX_ROOMS: usize = 256;
+    /// house has, and small enough for a linear search of the room at a point. Images name a room
+    /// and its lamp by one byte, of which one value means no room.
+    pub const MAX_ROOMS: usize = 255;
     /// Maximum number of openings in one episode. Our choice: several for each room.
     pub const MAX_OPENINGS: usize = 1024;
     /// Maximum number of floors in one episode, as [`Setup::MAX_OPENINGS`].
@@ -391,6 +395,13 @@ impl Setup {
             check_range(format!("walls[{i}].thickness_m"), w.thickness_m, 0.01, 5.0)?;
             check_range(format!("walls[{i}].bottom_m"), w.bottom_m, 0.0, 20.0)?;
             check_range(format!("walls[{i}].top_m"), w.top_m, w.bottom_m + 0.01, 20.0)?;
+        }
+        let length_m: f32 = self.walls.iter().map(|w| w.a.distance(w.b)).sum();
+        check_range("walls (total length)".into(), length_m, 0.0, Setup::MAX_WALL_LENGTH_M)?;
+        if self.ceiling_m.is_some() && self.ceiling_pieces().is_none() {
+            let max = Setup::MAX_CEILING_PIECES;
+            let problem = format!("cut the ceiling between them into more than {max} pieces");
+            return Err(SetupError::new("rooms", problem));
         }
         for (i, o) in self.openings.iter().enumerate() {
             for (side, room) in o.rooms.iter().enumerate() {

@@ -118,6 +118,55 @@ fn answered_requests_are_not_repeated_after_a_pause() {
 }
 
 #[test]
+fn no_answer_is_paid_for_that_the_record_may_have_no_room_for() {
+    let fixture = Fixture::new(&[TaskId::NoConstraint], 60);
+    let request = fixture.request(&["llm"]);
+    let (standin, mut settings) = standin(Options::default());
+    let max_answer_bytes = settings.endpoint.max_answer_bytes;
+    // The record has less room.
+    settings.endpoint.max_answer_bytes = 1 << 30;
+    for _ in 0..2 {
+        let language = LanguageHelpers::live(settings.clone(), flag()).unwrap();
+        assert!(!fixture.play("run", &request, &language).0);
+        let problem = language.problem().unwrap();
+        assert!(problem.contains("may have no room for the next answer"), "{problem}");
+    }
+    assert_eq!(standin.stats().requests, 0);
+    settings.endpoint.max_answer_bytes = max_answer_bytes;
+    let language = LanguageHelpers::live(settings, flag()).unwrap();
+    assert!(fixture.play("run", &request, &language).0, "{:?}", language.problem());
+}
+
+#[test]
+fn a_record_that_cannot_be_continued_stops_the_run_and_is_kept() {
+    let fixture = Fixture::new(&[TaskId::NoConstraint], 60);
+    let request = fixture.request(&["llm"]);
+    let (standin, settings) = standin(Options::default());
+    let language = LanguageHelpers::live(settings.clone(), flag()).unwrap();
+    let (_, results) = fixture.play("run", &request, &language);
+    let n_asked = standin.stats().requests;
+    // The episode is played again, but a line of its record has changed.
+    let run = fixture.path("run");
+    std::fs::remove_file(run.join("results.jsonl")).unwrap();
+    let path = record::path(&run, &results[0].key, chaic_core::AgentId::HELPER);
+    let whole = std::fs::read_to_string(&path).unwrap();
+    let damaged = whole.replacen("\"ask_hash\":\"", "\"ask_hash\":\"x", 1);
+    assert_ne!(damaged, whole);
+    std::fs::write(&path, &damaged).unwrap();
+    let language = LanguageHelpers::live(settings.clone(), flag()).unwrap();
+    assert!(!fixture.play("run", &request, &language).0);
+    let problem = language.problem().unwrap();
+    assert!(problem.contains("may hold paid answers") && problem.contains("line 2"), "{problem}");
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), damaged);
+    assert_eq!(standin.stats().requests, n_asked);
+    // Without it, the questions are asked again.
+    std::fs::remove_file(&path).unwrap();
+    let language = LanguageHelpers::live(settings, flag()).unwrap();
+    assert_eq!(fixture.play("run", &request, &language), (true, results));
+    assert_eq!(standin.stats().requests, 2 * n_asked);
+}
+
+#[test]
 fn budgets_are_exceeded_by_one_request_at_most_and_the_fallback_continues() {
     let fixture = Fixture::new(&[TaskId::NoConstraint, TaskId::HighTarget, TaskId::Obstacle], 300);
     let request = fixture.request(&["llm", "llm_known_task"]);

@@ -6,11 +6,14 @@ use std::time::Instant;
 use anyhow::Result;
 use chaic_eval::run::{Run, RunFolder};
 use chaic_eval::suite::SuiteFolder;
+use chaic_llm::record;
 use chaic_page::REPORT_FILE;
 use chaic_sandbox::Launcher;
 
 use super::eval_partners;
-use super::eval_session::{Played, Session, in_free_folder, request, write_reports};
+use super::eval_session::{
+    Played, Session, how_to_complete, in_free_folder, request, write_reports,
+};
 use super::given_partners::{GivenPartners, is_partner_file};
 use super::summary::{LineValue, print_scores, report_of};
 use crate::arguments::EvalArguments;
@@ -46,12 +49,13 @@ pub fn run(
     match played? {
         Played::Whole(run) => finish(&run, format, start),
         Played::Part(run) => {
+            let path = run.folder().path();
             print_error(&format!(
-                "shard {} is played: {} of {}; join the shards with: chaic merge --out WHOLE {} ...",
+                "shard {} is played: {} of {}; {}",
                 session.shard,
                 run.progress().finished,
                 counted(run.progress().total, "episode run"),
-                quoted_path(run.folder().path()),
+                how_to_complete(path, record::folder(path).exists()),
             ));
             Ok(ExitStatus::from_findings(run.progress().errors > 0))
         }

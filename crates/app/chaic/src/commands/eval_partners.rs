@@ -11,11 +11,14 @@ use chaic_eval::run::{FolderMode, Run, RunFolder, RunRequest};
 use chaic_eval::suite::{Robustness, SuiteFolder};
 use chaic_files::read_user_file;
 use chaic_llm::language::{is_language_helper, is_language_partner};
+use chaic_llm::record;
 use chaic_sandbox::Launcher;
 use serde_json::json;
 
-use super::eval_session::{Played, Session, in_free_folder, request, write_reports};
-use super::given_partners::GivenPartners;
+use super::eval_session::{
+    Played, Session, how_to_complete, in_free_folder, request, write_reports,
+};
+use super::given_partners::{GivenPartners, is_partner_file};
 use super::llm::check_partner;
 use crate::arguments::{EvalArguments, LanguageArguments};
 use crate::exit::ExitStatus;
@@ -48,7 +51,7 @@ pub(super) fn run(
         }
         given => {
             let path = arguments.out.as_deref().context("--resume needs --out")?;
-            resumed(path, given.as_ref())?
+            resumed(arguments, path, given.as_ref())?
         }
     };
     let request = if arguments.resume { request(arguments).0 } else { RunRequest::default() };
@@ -73,10 +76,12 @@ pub(super) fn run(
     if is_whole {
         print_robustness(&folder, format, Some(start))?;
     } else {
+        let has_language_records =
+            partners.iter().any(|entry| record::folder(&folder.run_path(entry)).exists());
         print_error(&format!(
-            "shard {} is played with every partner; join the shards with: chaic merge --out WHOLE {} ...",
+            "shard {} is played with every partner; {}",
             session.shard,
-            quoted_path(folder.path()),
+            how_to_complete(folder.path(), has_language_records),
         ));
     }
     Ok(ExitStatus::from_findings(n_errors > 0))
@@ -159,16 +164,35 @@ pub(super) fn refuse_single_run(path: &Path) -> Result<()> {
 }
 
 /// Returns the folder of runs that are resumed.
-fn resumed(path: &Path, given: Option<&PartnerSuite>) -> Result<SuiteFolder> {
+fn resumed(
+    arguments: &EvalArguments,
+    path: &Path,
+    given: Option<&PartnerSuite>,
+) -> Result<SuiteFolder> {
     refuse_single_run(path)?;
     if !SuiteFolder::is_suite(path) {
         RunFolder::check_started(path)?;
     }
     let folder = SuiteFolder::read(path)?;
+    if arguments.partner.is_some() || arguments.person.is_some() {
+        let text = "has runs with several partners; omit --partner and --person to resume them, or name one \
+                    of the runs by --out";
+        return Err(EvalError::Options(format!("{} {text}", path.display())).into());
+    }
     if let Some(suite) = given {
         folder.check_partners(suite)?;
     }
     folder.check_started()?;
+    let partners = folder.partners();
+    let from_file = |entry: &&SuitePartner| entry.partner.as_deref().is_some_and(is_partner_file);
+    if let Some(entry) = partners.iter().find(from_file).filter(|_| given.is_none()) {
+        return Err(EvalError::Options(format!(
+            "the partner `{}` of {} comes from a file; give the list again with --partners FILE",
+            entry.name,
+            path.display()
+        ))
+        .into());
+    }
     Ok(folder)
 }
 

@@ -88,6 +88,12 @@ impl<'a> Session<'a> {
             let (mut run, warnings) = Run::open(path, mode, request, helpers)?;
             warn_of_run(&run, &warnings);
             print_start(&run, path);
+            if language.is_some() && self.shard != Shard::WHOLE {
+                print_warning(
+                    "records of language models can't be merged; play all shards in this folder, one after the \
+                     other, with --resume",
+                );
+            }
             let mut bars = match part {
                 Some(part) => RunBars::for_part(&run, part),
                 None => RunBars::new(&run),
@@ -164,6 +170,17 @@ impl<'a> Session<'a> {
             quoted_path(path)
         )
     }
+}
+
+/// Returns how the folder of a played shard is completed.
+pub(super) fn how_to_complete(folder: &Path, has_language_records: bool) -> String {
+    let path = quoted_path(folder);
+    if has_language_records {
+        return format!(
+            "play the other shards in the same folder with: chaic eval --resume --out {path} --shard I/N ..."
+        );
+    }
+    format!("join the shards with: chaic merge --out WHOLE {path} ...")
 }
 
 /// Prints the extent of a run before it is played.
@@ -285,7 +302,8 @@ pub(super) fn hide_worker_panics() {
 
 /// Returns the options of helper processes and policies, which a resumed run needs again.
 ///
-/// The folder of a run does not decide which command runs or with which rights, and holds no weights.
+/// The folder of a run does not decide which command runs or with which rights, and holds no weights. It
+/// does not name the source of its episodes either, which stays hidden from helper processes.
 fn resume_options(arguments: &EvalArguments) -> String {
     if arguments.commands().is_empty() && arguments.policies().next().is_none() {
         return String::new();
@@ -322,13 +340,19 @@ fn resume_options(arguments: &EvalArguments) -> String {
     let variables = exec_env.iter().map(|name| format!(" --exec-env {}", quoted(name)));
     let readable = exec_read.iter().map(|path| format!(" --exec-read {}", quoted_path(path)));
     let trust = exec_trust.then(|| " --exec-trust".to_owned());
-    let sandbox = readable.chain(trust);
+    let is_hidden = |_: &&PathBuf| !arguments.commands().is_empty();
+    let hidden = arguments.episodes.iter().filter(is_hidden);
+    let hidden = hidden.map(|path| format!(" --episodes {}", quoted_path(path)));
+    let sandbox = readable.chain(trust).chain(hidden);
     given.chain(granted).chain(times).chain(memory).chain(variables).chain(sandbox).collect()
 }
 
 #[cfg(test)]
 mod tests {
+    use clap::Parser as _;
+
     use super::*;
+    use crate::arguments::{Arguments, Command};
 
     #[test]
     fn the_next_folder_is_used_if_another_command_takes_the_first() {
@@ -352,5 +376,19 @@ mod tests {
             bail!("another problem")
         });
         assert!(refused.is_err() && n_tried == 1, "other errors end the search");
+    }
+
+    #[test]
+    fn a_resumed_run_hides_its_episode_files_from_helper_processes() {
+        for (helper, expected) in [
+            ("mine=exec:./mine", " --helper mine=exec:./mine --episodes 'my files'"),
+            ("rhp,mine=policy:a", " --helper rhp --helper mine=policy:a"),
+            ("rhp", ""),
+        ] {
+            let line = ["chaic", "eval", "--episodes", "my files", "--helper", helper];
+            let arguments = Arguments::try_parse_from(line).expect("a valid command");
+            let Command::Eval(eval) = arguments.command else { panic!("{line:?}") };
+            assert_eq!(resume_options(&eval.run), expected);
+        }
     }
 }

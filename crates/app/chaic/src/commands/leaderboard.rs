@@ -58,10 +58,15 @@ fn collect(arguments: &LeaderboardBuildArguments) -> Result<Leaderboard> {
     let mut builder = LeaderboardBuilder::default();
     let mut n_folders = 0;
     for path in entries(&arguments.folder)? {
-        if kind(&path)? != EntryKind::Folder {
+        let is_link = kind(&path)? == EntryKind::Link;
+        if !path.is_dir() {
             continue;
         }
         n_folders += 1;
+        if is_link {
+            builder.refuse(&path, "it is a link; put the folder itself there");
+            continue;
+        }
         print_progress(&format!("{}: verifying", path.display()));
         let jobs = jobs(arguments.jobs);
         match verify_evaluation(&Evaluation::at(&path), commitment.as_ref(), jobs) {

@@ -28,7 +28,7 @@ use super::eval_session::hide_worker_panics;
 use super::given_partners::GivenPartners;
 use super::recorded::RecordedHelpers;
 use super::sealed::read_commitment;
-use super::submit_run::SubmissionPlayer;
+use super::submit_run::{SubmissionPlayer, refuse_language_partners};
 use super::submitted::{SandboxOptions, SubmittedHelpers};
 use super::{bars, jobs, start_threads};
 use crate::arguments::{
@@ -191,6 +191,7 @@ fn play(
     let list = arguments.partners.as_deref();
     let mut files = GivenPartners::default();
     let partners = list.map(|list| read_partners(list, &mut files)).transpose()?;
+    partners.as_ref().map_or(Ok(()), refuse_language_partners)?;
     // A wrong folder of episodes leaves no submission behind.
     tasks_of_files(&arguments.episodes)?;
     let evaluation = Evaluation::at(&arguments.out);

@@ -5,16 +5,19 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::Result;
 use chaic_env::helper_registry::HelperRegistry;
-use chaic_env::partner_suite::PartnerSuite;
+use chaic_env::partner_suite::{PartnerSuite, SuitePartner};
+use chaic_eval::EvalError;
 use chaic_eval::report::{Format, write_files};
 use chaic_eval::run::{FolderMode, Run, RunProgress, RunRequest};
 use chaic_eval::suite::SuiteFolder;
+use chaic_llm::language::is_language_partner;
 use chaic_page::{no_language, write_report};
 use serde_json::{Value, json};
 
 use super::bars::RunBars;
 use super::eval_partners::{partner_request, refuse_single_run, write_robustness};
 use super::eval_session::warn_of_run;
+use super::given_partners::is_partner_file;
 use super::summary::report_of;
 use crate::exit::{ExitStatus, with_hint};
 use crate::output::{
@@ -55,7 +58,10 @@ impl SubmissionPlayer<'_> {
     fn start_partners(&self, given: Option<PartnerSuite>) -> Result<Option<SuiteFolder>> {
         let is_started = SuiteFolder::is_suite(self.run);
         let started = if is_started { Some(SuiteFolder::read(self.run)?) } else { None };
-        let Some(suite) = given else { return Ok(started) };
+        let Some(suite) = given else {
+            started.as_ref().map_or(Ok(()), require_no_files)?;
+            return Ok(started);
+        };
         refuse_single_run(self.run)?;
         if let Some(folder) = started {
             folder.check_partners(&suite)?;
@@ -167,4 +173,37 @@ impl SubmissionPlayer<'_> {
         print_result(self.format, &json, &text)?;
         Ok(ExitStatus::from_findings(errors > 0))
     }
+}
+
+/// Refuses a list with a language model: a submission plays without an endpoint.
+///
+/// # Errors
+/// [`EvalError::Options`] with the first such partner.
+pub(super) fn refuse_language_partners(suite: &PartnerSuite) -> Result<()> {
+    let Some(entry) = find_agent(suite, is_language_partner) else { return Ok(()) };
+    let problem = format!(
+        "the partner `{}` asks a language model, which a contest does not have; remove it from the \
+         list",
+        entry.name
+    );
+    Err(EvalError::Options(problem).into())
+}
+
+/// Refuses to continue without the list if a partner comes from a file, which only the list names.
+///
+/// # Errors
+/// [`EvalError::Options`] with the first such partner.
+fn require_no_files(folder: &SuiteFolder) -> Result<()> {
+    let Some(entry) = find_agent(folder.suite(), is_partner_file) else { return Ok(()) };
+    let problem = format!(
+        "the partner `{}` of {} comes from a file; repeat --partners with the list that names it",
+        entry.name,
+        folder.path().display()
+    );
+    Err(EvalError::Options(problem).into())
+}
+
+/// Returns the first partner whose agent has a name of this kind.
+fn find_agent(suite: &PartnerSuite, is_kind: fn(&str) -> bool) -> Option<&SuitePartner> {
+    suite.partners().iter().find(|entry| entry.partner.as_deref().is_some_and(is_kind))
 }

@@ -136,6 +136,10 @@ fn program(
 ) -> Result<HelperProgram> {
     let SandboxOptions { launcher, masked, allows_partial } = sandbox;
     let manifest = submission.manifest();
+    if cfg!(windows) {
+        let text = format!("the program of {} runs on Linux and macOS only", manifest.name);
+        return Err(Refusal(text).into());
+    }
     let folder = std::path::absolute(submission.helper_folder())?;
     let Some(folder_text) = folder.to_str() else {
         let text = format!("{} is not UTF-8; choose another folder", folder.display());

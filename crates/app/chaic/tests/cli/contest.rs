@@ -276,6 +276,76 @@ fn the_same_archive_gives_the_same_score_in_another_folder() {
     assert_eq!(first, second);
 }
 
+#[cfg(unix)]
+#[test]
+fn a_linked_result_is_refused_and_not_left_out() {
+    let dir = tempfile::tempdir().expect("the disk has space");
+    let at = dir.path();
+    for folder in ["elsewhere/mine", "results"] {
+        fs::create_dir_all(at.join(folder)).expect("the disk has space");
+    }
+    std::os::unix::fs::symlink(at.join("elsewhere/mine"), at.join("results/mine")).expect("a link");
+    let built = fail(at, &["leaderboard", "build", "results", "--out", "page.html"]);
+    assert!(built.contains("REFUSED mine: it is a link; put the folder itself there"), "{built}");
+}
+
+/// Makes a wheel of the example in Python: arguments are the folder of the example and the wheel.
+const MAKE_WHEEL: &str = r#"
+import sys, zipfile
+
+example, wheel = sys.argv[1:]
+with zipfile.ZipFile(wheel, "w") as archive:
+    with open(example + "/helper.py") as helper:
+        main = helper.read().replace("from chaic_helper", "from .chaic_helper")
+    archive.writestr("nearest/__init__.py", "")
+    archive.writestr("nearest/__main__.py", main)
+    archive.write(example + "/chaic_helper.py", "nearest/chaic_helper.py")
+    info = "nearest-1.0.dist-info/"
+    archive.writestr(info + "METADATA", "Metadata-Version: 2.1\nName: nearest\nVersion: 1.0\n")
+    archive.writestr(info + "WHEEL", "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
+    archive.writestr(info + "RECORD", "")
+"#;
+
+/// Makes a wheel and installs it into `mine/helper`, as docs/arena.md describes. Returns false on systems without
+/// Python or pip.
+fn install_wheel(at: &Path) -> bool {
+    let python = |arguments: &[&str]| {
+        let out = std::process::Command::new("python3").args(arguments).current_dir(at).output();
+        out.is_ok_and(|out| out.status.success())
+    };
+    if !python(&["-m", "pip", "--version"]) {
+        return false;
+    }
+    let example = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../examples/python_helper");
+    let wheel = "nearest-1.0-py3-none-any.whl";
+    assert!(python(&["-c", MAKE_WHEEL, example, wheel]), "the wheel is made");
+    let install = ["-m", "pip", "install", "--no-deps", "--no-index", "--target", "mine/helper"];
+    assert!(python(&[&install[..], &[wheel]].concat()), "the wheel is installed");
+    true
+}
+
+#[test]
+fn a_wheel_is_submitted_and_scored() {
+    let dir = tempfile::tempdir().expect("the disk has space");
+    let at = dir.path();
+    write_manifest(&at.join("mine"), "mine", r#"command = ["python3", "-m", "nearest"]"#, GRANTS);
+    if !install_wheel(at) {
+        return;
+    }
+    let generate = ["episodes", "generate", "--task", "no_constraint", "--seeds", "0..1"];
+    run_ok(at, &[&generate[..], &["--out", "short"]].concat());
+    shorten(&at.join("short"));
+    // pip compiles the modules; the archive has no bytecode.
+    succeed(at, &["submit", "pack", "mine", "--out", "mine.tar"]);
+    let play = ["submit", "run", "mine.tar", PARTIAL, "--episodes", "short", "--out", "result"];
+    let played = succeed(at, &play);
+    assert!(played.contains("2 episode runs") && !played.contains("failed"), "{played}");
+    assert!(at.join("result/submission/helper/nearest/__main__.py").exists());
+    succeed(at, &["submit", "score", "result"]);
+    let confirmed = succeed(at, &["submit", "verify", "result"]);
+    assert!(confirmed.contains("confirmed by 2 traces"), "{confirmed}");
+}
+
 #[test]
 #[cfg(target_os = "linux")]
 fn a_program_needs_the_whole_sandbox_or_the_option_of_the_organizer() {

@@ -187,6 +187,30 @@ fn tables_never_mix_lists_of_partners() {
 }
 
 #[test]
+fn a_partner_from_a_file_needs_the_list_again() {
+    let dir = contest();
+    let at = dir.path();
+    let weights = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../learn/chaic-learn/weights/partner.safetensors");
+    fs::copy(weights, at.join("p.safetensors")).expect("the disk has space");
+    let list = LIST.replace("cloned", "policy:p.safetensors");
+    fs::write(at.join("list.json"), list).expect("the disk has space");
+    let with_list = ["--partners", "list.json"];
+    play(at, "results/mine", &with_list);
+    let results = at.join("results/mine/run/learned/results.jsonl");
+    let journal = read(&results);
+    let refused = run_err(at, &[&PLAY[..], &["--out", "results/mine"]].concat());
+    let words = "the partner `learned` of results/mine/run comes from a file; repeat --partners";
+    assert!(refused.contains(words) && refused.lines().count() == 1, "{refused}");
+    play(at, "results/mine", &with_list);
+    assert_eq!(read(&results), journal);
+    // Readers need no weights.
+    fs::remove_file(at.join("p.safetensors")).expect("it exists");
+    let confirmed = run_ok(at, &["submit", "verify", "results/mine"]);
+    assert!(confirmed.contains("confirmed by 8 traces"), "{confirmed}");
+}
+
+#[test]
 fn wrong_lists_of_a_contest_are_refused_as_by_eval() {
     let dir = contest();
     let at = dir.path();
@@ -203,6 +227,7 @@ fn wrong_lists_of_a_contest_are_refused_as_by_eval() {
         ("\"drawn:7\"", "\"habits:pause=999\"", "from 0 to 600"),
         ("\"drawn:7\"", "\"recorded:missing\"", "missing"),
         ("\"cloned\"", "\"ogre\"", "unknown partner `ogre`"),
+        ("\"cloned\"", "\"llm\"", "the partner `learned` asks a language model"),
         ("+tires", "rider", "0 bicycles"),
     ] {
         assert!(LIST.contains(from), "{from}");

@@ -173,6 +173,21 @@ fn prompts_contain_failed_attempts_that_the_behavior_network_recognizes() {
 }
 
 #[test]
+fn shards_with_a_language_model_are_played_in_one_folder() {
+    let dir = short_episodes();
+    let at = dir.path();
+    let server = standin(Options::default());
+    let url = server.url();
+    let out = output_of(at, &[&play(&url, "run")[..], &["--shard", "1/2"]].concat());
+    let message = text(&out.stderr);
+    assert!(out.status.success() && message.contains("can't be merged"), "{message}");
+    assert!(message.contains("--resume --out run --shard I/N"), "{message}");
+    assert!(!message.contains("chaic merge"), "{message}");
+    let resume = ["eval", "--resume", "--out", "run", "--endpoint", &url, "--shard", "2/2"];
+    assert!(run_ok(at, &resume).contains("LLM"));
+}
+
+#[test]
 fn no_control_character_reaches_the_terminal() {
     const EVIL: &str = "\u{1b}]0;owned\u{7}\u{1b}[2J\r\u{9b}31m\u{202e}";
     let dir = short_episodes();

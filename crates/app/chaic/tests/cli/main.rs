@@ -83,12 +83,17 @@ fn short_episodes() -> tempfile::TempDir {
 
 /// Shortens the episode files of a folder to [`FRAMES`].
 fn shorten(folder: &Path) {
+    shorten_to(folder, FRAMES);
+}
+
+/// Sets the length of the episode files of a folder.
+fn shorten_to(folder: &Path, frames: u32) {
     for entry in fs::read_dir(folder).expect("it exists") {
         let path = entry.expect("it exists").path();
         let json = fs::read_to_string(&path).expect("a text file");
         let begin = json.find("\"horizon\": ").expect("an episode has one") + 11;
         let end = begin + json[begin..].find(',').expect("more follows");
-        let short = format!("{}{FRAMES}{}", &json[..begin], &json[end..]);
+        let short = format!("{}{frames}{}", &json[..begin], &json[end..]);
         fs::write(&path, short).expect("the disk has space");
     }
 }

@@ -84,6 +84,10 @@ fn runs_with_several_partners_resume_verify_and_report() {
     fs::write(at.join("other.json"), LIST.replace("drawn:7", "drawn:8")).expect("space");
     let refused = run_err(at, &["eval", "--resume", "--out", "s", "--partners", "other.json"]);
     assert!(refused.contains("was started with other partners"), "{refused}");
+    for (option, value) in [("--partner", "drawn:7"), ("--person", "child")] {
+        let refused = run_err(at, &["eval", "--resume", "--out", "s", option, value]);
+        assert!(refused.contains("s has runs with several partners; omit --partner"), "{refused}");
+    }
     for arguments in [&["report", "s", "--losses"][..], &["show", "s"]] {
         let refused = run_err(at, arguments);
         assert!(refused.contains("name one of them, such as s/rules"), "{refused}");
@@ -223,4 +227,50 @@ fn a_recorded_partner_repeats_a_trace_and_is_named_by_its_digest() {
         let refused = run_err(at, &play(&[&split[..], &["d", "--partner", partner]].concat()));
         assert!(refused.contains(words) && refused.lines().count() <= 2, "{refused}");
     }
+}
+
+/// The scripted server stands in for a language model, and a trace of the ordinary partner for a recorded person.
+#[test]
+fn a_list_may_name_a_language_model_and_a_recorded_person() {
+    use chaic_llm_standin::{Options, StandIn};
+    const PEOPLE: &str = r#"{
+      "format": "chaic-partners",
+      "version": 1,
+      "partners": [
+        { "name": "model", "partner": "llm" },
+        { "name": "person", "partner": "recorded:alone" }
+      ]
+    }"#;
+    let dir = tempfile::tempdir().expect("the disk has space");
+    let at = dir.path();
+    let generate = ["episodes", "generate", "--task", "no_constraint", "--seeds", "12..13"];
+    run_ok(at, &[&generate[..], &["--out", "short"]].concat());
+    // The partner picks up its first object in frame 127.
+    shorten_to(&at.join("short"), 200);
+    let play = ["eval", "--episodes", "short", "--size", "16", "--helper"];
+    run_ok(at, &[&play[..], &["none", "--out", "alone"]].concat());
+    fs::write(at.join("people.json"), PEOPLE).expect("the disk has space");
+    let standin = StandIn::start(Options::default()).expect("a port is free");
+    let url = standin.url();
+    let model = ["--endpoint", &url, "--model", "standin", "--partners", "people.json"];
+    run_ok(at, &[&play[..], &["none,random", "--out", "s"], &model].concat());
+    let header = |partner: &str| {
+        let trace = format!("s/{partner}/traces/no_constraint/random/gen-12-s0.jsonl");
+        read(&at.join(trace)).lines().next().expect("a header").to_owned()
+    };
+    assert!(header("model").contains(r#""partner":"llm""#), "{}", header("model"));
+    assert!(header("person").contains(r#""partner":"recorded:"#), "{}", header("person"));
+    let repeated = read(&at.join("s/person/results.jsonl"));
+    assert!(repeated.contains(r#""partner.repeated":1"#), "{repeated}");
+    // The list names files, so a resumed run needs it again.
+    let resume = ["eval", "--resume", "--out", "s"];
+    let refused = run_err(at, &resume);
+    assert!(refused.contains("the partner `person` of s comes from a file"), "{refused}");
+    assert!(refused.contains("with --partners FILE"), "{refused}");
+    run_ok(at, &[&resume[..], &model].concat());
+    // Verification needs neither the server nor the recording.
+    drop(standin);
+    fs::remove_dir_all(at.join("alone")).expect("it exists");
+    let verified = run_ok(at, &["verify", "s"]);
+    assert!(verified.contains("the runs differ in the partner only"), "{verified}");
 }

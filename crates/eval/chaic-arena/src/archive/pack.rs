@@ -8,7 +8,10 @@ use sha2::{Digest as _, Sha256};
 use tar::{EntryType, Header};
 
 use super::entry_path::{Paths, check_path};
-use super::{MAX_DEPTH, MAX_ENTRIES, MAX_FILE_BYTES, MAX_TOTAL_BYTES, refused};
+use super::{
+    BYTECODE, MAX_DEPTH, MAX_ENTRIES, MAX_FILE_BYTES, MAX_TOTAL_BYTES, PACKAGE_DESCRIPTION,
+    PACKAGE_ORIGIN, refused,
+};
 use crate::error::Result;
 use crate::secret::to_hex;
 
@@ -28,7 +31,8 @@ pub struct PackedArchive {
 
 /// Packs the files of a folder into an uncompressed tar archive, sorted by path, without times and owners.
 ///
-/// Lock files are left out, because they hold no content. So are empty folders.
+/// Lock files are left out, because they hold no content. So are empty folders, the bytecode of Python, and the
+/// files in which pip records where a package came from: they name paths of the author.
 ///
 /// # Errors
 /// [`ArenaError`](crate::ArenaError) if an entry is no regular file or folder, a name or size is not
@@ -41,20 +45,21 @@ pub fn pack(folder: &Path, archive: &Path) -> Result<PackedArchive> {
     }
     let file = TemporaryFile::beside(archive).map_err(FileError::context("create", archive))?;
     let mut output = Hashed::new(BufWriter::new(file));
-    let n_files = write_archive(folder, &mut output)?;
+    let n_files = write_archive(folder, false, &mut output)?;
     let Hashed { inner, digest, bytes } = output;
     let file = inner.into_inner().map_err(io::IntoInnerError::into_error);
     file.and_then(TemporaryFile::commit).map_err(FileError::context("write", archive))?;
     Ok(PackedArchive { n_files, bytes, sha256: to_hex(&digest.finalize()) })
 }
 
-/// Returns the SHA-256 of the archive that [`pack`] writes of a folder.
+/// Returns the SHA-256 of the archive with all files of a folder that archives may hold. That of an extracted
+/// archive is the one that [`pack`] returned. Archives of other programs may hold records of pip, which count.
 ///
 /// # Errors
 /// Those of [`pack`].
 pub fn content_sha256(folder: &Path) -> Result<String> {
     let mut output = Hashed::new(io::sink());
-    write_archive(folder, &mut output)?;
+    write_archive(folder, true, &mut output)?;
     Ok(to_hex(&output.digest.finalize()))
 }
 
@@ -92,8 +97,8 @@ impl<W: Write> Write for Hashed<W> {
     }
 }
 
-/// Writes the archive of a folder; returns the number of files.
-fn write_archive(folder: &Path, output: &mut dyn Write) -> Result<usize> {
+/// Writes the archive of a folder, with or without the origins of Python packages; returns the number of files.
+fn write_archive(folder: &Path, with_origins: bool, output: &mut dyn Write) -> Result<usize> {
     let mut paths = Paths::default();
     let (mut n_files, mut total) = (0, 0);
     for Entry { path, kind } in walk(folder, MAX_DEPTH as u32 - 1)? {
@@ -104,6 +109,18 @@ fn write_archive(folder: &Path, output: &mut dyn Write) -> Result<usize> {
         let below = path.strip_prefix(folder).map_err(|_| refuse("lies outside".to_owned()))?;
         // Archives separate names by slashes on every system.
         let names: Vec<_> = below.iter().map(|name| name.to_string_lossy()).collect();
+        if names.iter().any(|name| *name == BYTECODE) {
+            continue;
+        }
+        let is_origin = match &names[..] {
+            [.., package, file] => {
+                package.ends_with(PACKAGE_DESCRIPTION) && *file == PACKAGE_ORIGIN
+            }
+            _ => false,
+        };
+        if is_origin && !with_origins {
+            continue;
+        }
         let name = names.join("/");
         let name = check_path(name.as_bytes()).map_err(refuse)?;
         paths.add(name, false).map_err(refuse)?;

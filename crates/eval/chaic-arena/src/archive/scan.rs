@@ -8,7 +8,7 @@ use flate2::bufread::MultiGzDecoder;
 use tar::{EntryType, Header};
 
 use super::entry_path::{Paths, check_path};
-use super::{MAX_ENTRIES, MAX_FILE_BYTES, MAX_TOTAL_BYTES, refused};
+use super::{BYTECODE, MAX_ENTRIES, MAX_FILE_BYTES, MAX_TOTAL_BYTES, refused};
 use crate::error::{ArenaError, Result};
 
 /// Size of a block of the tar format, bytes.
@@ -124,9 +124,15 @@ impl Scan<'_> {
             }
         }
         let path = check_path(name).map_err(refuse)?.to_owned();
-        // Archives are packed and hashed without lock files.
+        // Archives are packed and hashed without lock files and bytecode.
         if path.rsplit('/').next() == Some(LOCK) {
             return Err(refuse(format!("is named `{LOCK}`")));
+        }
+        if path.split('/').any(|name| name == BYTECODE) {
+            return Err(refuse(format!(
+                "belongs to `{BYTECODE}`; make the archive with `chaic submit pack`, which leaves it \
+                 out"
+            )));
         }
         self.paths.add(&path, is_folder).map_err(refuse)?;
         if size > MAX_FILE_BYTES {

@@ -368,6 +368,22 @@ fn repeated_and_contradictory_evaluations_are_refused() {
     assert!(contradictory.starts_with("obstacle/sealed/000 with none and seed 0 ends otherwise"));
 }
 
+/// A built-in helper may be submitted too. It plays as where it is the reference.
+#[test]
+fn a_submitted_built_in_helper_plays_as_the_reference() {
+    let unrestricted = rules("a", "unrestricted");
+    let first = entry("first", &unrestricted, [5; 6]);
+    // RHP has 4, 5, 4, 5, 4, 5 tenths.
+    assert_eq!(conflict(&first, &entry("rhp", &unrestricted, [4, 5, 4, 5, 4, 5])), None);
+    let reason = conflict(&first, &entry("rhp", &unrestricted, [4, 5, 9, 5, 4, 5]));
+    let expected = "obstacle/sealed/002 with rhp and seed 0 ends otherwise than in of-first";
+    assert!(reason.as_ref().is_some_and(|text| text.starts_with(expected)), "{reason:?}");
+    // Versions of one helper play differently.
+    let mut second = entry("first", &unrestricted, [6; 6]);
+    second.score.submission.sha256 = "0".repeat(64);
+    assert_eq!(conflict(&first, &second), None);
+}
+
 #[test]
 fn texts_cannot_add_markup_and_the_page_loads_nothing() {
     let mut builder = LeaderboardBuilder::default();

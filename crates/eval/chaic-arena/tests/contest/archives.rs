@@ -20,12 +20,20 @@ fn write_submission(at: &Path) {
     fs::write(at.join("helper/.lock"), "").expect("the disk has space");
 }
 
+/// Writes bytecode as Python does beside a module that it imports; it differs between times.
+fn write_bytecode(helper: &Path, content: &str) {
+    let folder = helper.join("__pycache__");
+    fs::create_dir(&folder).expect("the disk has space");
+    fs::write(folder.join("helper.cpython-311.pyc"), content).expect("the disk has space");
+}
+
 #[test]
 fn equal_content_gives_equal_archives_and_comes_back() {
     let dir = tempfile::tempdir().expect("the disk has space");
     let at = dir.path();
     for name in ["a", "b"] {
         write_submission(&at.join(name));
+        write_bytecode(&at.join(name).join("helper"), name);
     }
     let packed = pack(&at.join("a"), &at.join("a.tar")).expect("a plain folder");
     let again = pack(&at.join("b"), &at.join("b.tar")).expect("a plain folder");
@@ -50,6 +58,27 @@ fn equal_content_gives_equal_archives_and_comes_back() {
     fs::write(at.join("a.tar.gz"), gzip(&bytes)).expect("the disk has space");
     extract(&at.join("a.tar.gz"), &at.join("d")).expect("gzip is allowed");
     assert_eq!(content_sha256(&at.join("d")).expect("the folder"), packed.sha256);
+}
+
+#[test]
+fn an_archive_names_no_path_of_its_author() {
+    let dir = tempfile::tempdir().expect("the disk has space");
+    let at = dir.path();
+    write_submission(&at.join("a"));
+    let plain = pack(&at.join("a"), &at.join("plain.tar")).expect("a plain folder");
+    let package = at.join("a/helper/mine-1.0.dist-info");
+    fs::create_dir(&package).expect("the disk has space");
+    let url = r#"{"url": "file:///home/author/mine-1.0-py3-none-any.whl"}"#;
+    fs::write(package.join("direct_url.json"), url).expect("the disk has space");
+    assert_eq!(pack(&at.join("a"), &at.join("a.tar")).expect("a plain folder"), plain);
+    // Another folder may hold a file of this name.
+    fs::write(at.join("a/helper/direct_url.json"), "{}").expect("the disk has space");
+    let packed = pack(&at.join("a"), &at.join("a.tar")).expect("a plain folder");
+    assert_eq!(packed.n_files, plain.n_files + 1);
+    // Archives of other programs may hold such files, so they count in the version of the code.
+    extract(&at.join("a.tar"), &at.join("b")).expect("it was packed here");
+    assert_eq!(content_sha256(&at.join("b")).expect("the folder"), packed.sha256);
+    assert_ne!(content_sha256(&at.join("a")).expect("the folder"), packed.sha256);
 }
 
 #[cfg(unix)]
@@ -134,6 +163,10 @@ fn an_evaluation_keeps_its_submission() {
     let first = evaluation.add_submission(&at.join("one.tar")).expect("a submission");
     let again = evaluation.add_submission(&at.join("one.tar")).expect("the same submission");
     assert_eq!(first.sha256(), again.sha256());
+    // A program that ran without a sandbox has written beside its modules.
+    write_bytecode(&at.join("result/submission/helper"), "bytecode");
+    let later = evaluation.add_submission(&at.join("one.tar")).expect("the same submission");
+    assert_eq!(first.sha256(), later.sha256());
     let error = evaluation.add_submission(&at.join("two.tar")).expect_err("another one");
     assert!(error.to_string().contains("two.tar; choose another --out"), "{error}");
     assert!(matches!(error, ArenaError::Eval(EvalError::Options(_))), "an invalid request");

@@ -57,6 +57,8 @@ fn paths() -> Vec<Case> {
         ("long", at_prefix(&[long.clone(), vec![b'b'; 10]].concat(), &long), "longer than 200"),
         ("deep", at_path(deep.as_bytes()), "has more than 8 names"),
         ("lock file", at_path(b"helper/.lock"), "is named `.lock`"),
+        ("bytecode", at_path(b"helper/__pycache__/evil.pyc"), "belongs to `__pycache__`"),
+        ("folder of bytecode", with(folder("helper/__pycache__/")), "belongs to `__pycache__`"),
         ("parent in the prefix", at_prefix(b"..", b"evil"), "leads out of the archive"),
         ("absolute prefix", at_prefix(b"/etc", b"evil"), "is an absolute path"),
     ]

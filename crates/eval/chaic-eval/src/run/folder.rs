@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use chaic_core::observation::SensorConfig;
 use chaic_env::trace::{Trace, TraceWarning};
 use chaic_env::{CHAIC_VERSION, Digest, EnvError, RunKey, slug};
 use chaic_episodes::{Episode, MAX_EPISODE_BYTES, find_episode};
@@ -13,7 +14,7 @@ use chaic_files::{
 use serde::{Deserialize, Serialize};
 
 use crate::error::{EvalError, Result};
-use crate::run::granted::RunGrants;
+use crate::run::granted::{RequestedImages, RunGrants};
 use crate::run::options::{FILES, RunOptions};
 use crate::trace_file;
 
@@ -76,6 +77,9 @@ struct RunFile {
     /// Absent in runs of older versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     granted: Option<RunGrants>,
+    /// Absent in runs of older versions, and without helpers that have an isolation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    images: Option<RequestedImages>,
 }
 
 impl RunFile {
@@ -281,6 +285,24 @@ impl RunFolder {
         )))
     }
 
+    /// Returns the recorded images of helpers; see [`RunGrants::requested_images`].
+    pub(crate) fn images(&self) -> Result<Option<RequestedImages>> {
+        Ok(self.recorded()?.and_then(|file| file.images))
+    }
+
+    /// Checks that the helpers of a resumed run request the images that `run.json` records.
+    pub(crate) fn check_images(&self, given: Option<&RequestedImages>) -> Result<()> {
+        let (Some(recorded), Some(given)) = (self.images()?, given) else { return Ok(()) };
+        let differs = |name: &&String| recorded.get(*name) != given.get(*name);
+        let Some(name) = recorded.keys().chain(given.keys()).find(differs) else { return Ok(()) };
+        Err(EvalError::Options(format!(
+            "{name} requests {} now, but {} has {}; give the same helper or start a new run",
+            described(given.get(name)),
+            self.join(RUN_FILE).display(),
+            described(recorded.get(name)),
+        )))
+    }
+
     /// Returns the version of chaic that started the run if it is not this version.
     pub(crate) fn other_version(&self) -> Result<Option<String>> {
         Ok(self.recorded()?.map(|file| file.chaic).filter(|chaic| chaic != CHAIC_VERSION))
@@ -391,7 +413,12 @@ impl RunFolder {
         self.episode_files().join(format!("{task}-{}.json", slug(task, id)))
     }
 
-    pub(crate) fn write_options(&self, options: &RunOptions, granted: &RunGrants) -> Result<()> {
+    pub(crate) fn write_options(
+        &self,
+        options: &RunOptions,
+        granted: &RunGrants,
+        images: Option<RequestedImages>,
+    ) -> Result<()> {
         let file = RunFile {
             format: FORMAT.to_owned(),
             version: VERSION,
@@ -400,6 +427,7 @@ impl RunFolder {
             digest: options.digest(),
             options: options.clone(),
             granted: Some(granted.clone()),
+            images,
         };
         self.write(RUN_FILE, file.to_text().as_bytes())
     }
@@ -470,6 +498,15 @@ impl RunFolder {
         }
         Ok(Some(file))
     }
+}
+
+/// Returns a description of requested images, such as `rgb, depth of 64 pixels`.
+fn described(images: Option<&SensorConfig>) -> String {
+    let Some(images) = images else { return "no images".to_owned() };
+    let kinds = [("rgb", images.rgb), ("depth", images.depth), ("ids", images.ids)];
+    let kinds = kinds.into_iter().filter(|(_, is_requested)| *is_requested);
+    let kinds: Vec<&str> = kinds.map(|(kind, _)| kind).collect();
+    format!("{} of {} pixels", kinds.join(", "), images.image_size)
 }
 
 /// Checks that the content of a folder permits this access.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use chaic_agents::partners::partner_grants;
-use chaic_core::observation::Grants;
+use chaic_core::observation::{Grants, SensorConfig};
 use chaic_env::helper_registry::{self, HelperRegistry};
 use serde::{Deserialize, Serialize};
 
@@ -30,6 +30,9 @@ pub struct RunGrants {
     pub weights: BTreeMap<String, String>,
 }
 
+/// Images that helpers request before their first briefing, by name; without helpers that request none.
+pub(crate) type RequestedImages = BTreeMap<String, SensorConfig>;
+
 impl RunGrants {
     /// Returns the grants that the helpers of these options request.
     ///
@@ -53,6 +56,27 @@ impl RunGrants {
         let granted = RunGrants { helpers: grants, partner, perception, isolation, weights };
         granted.check_track(options)?;
         Ok(granted)
+    }
+
+    /// Returns the images that the helpers with an isolation request. Helpers of Python know them at once,
+    /// other processes only when they are briefed. `None` if no helper has an isolation: options and
+    /// version then determine all images.
+    ///
+    /// # Errors
+    /// If the options name an unknown helper or rule.
+    pub(crate) fn requested_images(
+        &self,
+        options: &RunOptions,
+        helpers: &dyn HelperRegistry,
+    ) -> Result<Option<RequestedImages>> {
+        let rules = options.rules()?.planner;
+        let mut images = RequestedImages::new();
+        for name in self.isolation.keys() {
+            let helper = helper_registry::find(helpers, name, rules)?;
+            let sensors = helper.map(|helper| helper.agent.sensors());
+            images.extend(sensors.filter(SensorConfig::wants_image).map(|s| (name.clone(), s)));
+        }
+        Ok((!self.isolation.is_empty()).then_some(images))
     }
 
     /// Checks that the run's track allows the grants and the isolation of all helpers, the

@@ -89,6 +89,7 @@ pub fn merge(out: &Path, parts: &[PathBuf]) -> Result<Run> {
     let granted = source.granted()?.ok_or_else(|| {
         EvalError::Options(format!("{} was started by an older version of chaic", first.display()))
     })?;
+    let images = source.images()?;
     let planned = plan::planned(&source, &options)?;
     let from_parts = results(&folders, &planned)?;
     let is_traced = |result: &RunResult| options.traces && result.summary().is_some();
@@ -115,7 +116,7 @@ pub fn merge(out: &Path, parts: &[PathBuf]) -> Result<Run> {
         let report = Report { version, options, results, planned, granted, formulas };
         write_files(&folder, &report)?;
     }
-    folder.write_options(&options, &granted)?;
+    folder.write_options(&options, &granted, images)?;
     folder.end_merge()?;
     let (journal, results, _) = Journal::open(&folder.results(), &planned)?;
     Ok(Run { folder, options, granted, journal, planned, results, untraced: Vec::new() })
@@ -130,7 +131,8 @@ fn read_parts(
     source: &RunFolder,
     options: &RunOptions,
 ) -> Result<Vec<RunFolder>> {
-    let (granted, source_commands) = (source.granted()?, commands(source)?);
+    let (granted, images) = (source.granted()?, source.images()?);
+    let source_commands = commands(source)?;
     let first = source.path().display();
     let refused = |problem: String| Err(EvalError::Options(problem));
     let mut folders = Vec::with_capacity(parts.len());
@@ -139,6 +141,7 @@ fn read_parts(
         let part = path.display();
         if part_options != *options
             || folder.granted()? != granted
+            || folder.images()? != images
             || folder.other_version()?.is_some()
         {
             return refused(format!(
@@ -154,8 +157,8 @@ fn read_parts(
         }
         if commands(&folder)? != source_commands {
             return refused(format!(
-                "{first} and {part} were played with other commands; play all shards with the same \
-                 --helper and --exec-env"
+                "{first} and {part} were played with other commands or limits; play all shards with the \
+                 same --helper and --exec options"
             ));
         }
         if kind(&folder.join(RECORDS))? != EntryKind::Missing {
@@ -193,12 +196,13 @@ pub(crate) fn reopen_merged(out: &Path, parts: &[PathBuf]) -> Result<Run> {
     let other_run = || EvalError::NotEmpty { path: out.to_owned() };
     let (folder, recorded) = RunFolder::lock(out, FolderMode::Resume)?;
     let (options, granted) = recorded.zip(folder.granted()?).ok_or_else(other_run)?;
-    let merged_commands = commands(&folder)?;
+    let (merged_commands, images) = (commands(&folder)?, folder.images()?);
     let mut folders = Vec::with_capacity(parts.len());
     for part in parts {
         let (part, part_options) = RunFolder::read(part)?;
         let is_same = part_options == options
             && part.granted()?.as_ref() == Some(&granted)
+            && part.images()? == images
             && commands(&part)? == merged_commands;
         if !is_same || (options.split == FILES && !plan::same_copies(&part, &folder)?) {
             return Err(other_run());

@@ -1,6 +1,5 @@
 //! Training of the opponent model.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -14,8 +13,8 @@ use chaic_training::bounds::{
     ADAM, Bound, BoundTable, LEARNING_RATE, SEED, SHARDS, STEPS, integer, real,
 };
 use chaic_training::{
-    CONFIG, Checkpoint, CheckpointError, Learner, Metrics, Trainer, TrainingError, defined_metrics,
-    learning_rate_at, metrics,
+    CONFIG, Checkpoint, CheckpointError, Learner, Metrics, Settings, Trainer, TrainingError,
+    changed_setting, defined_metrics, learning_rate_at, metrics,
 };
 use serde::{Deserialize, Serialize};
 
@@ -103,10 +102,10 @@ const MAX_SETTINGS_BYTES: u64 = 1 << 16;
 
 impl OpponentConfig {
     /// Returns the values of the keys that decide about training and validation windows.
-    fn data_settings(&self) -> BTreeMap<String, String> {
+    fn data_settings(&self) -> Settings {
         let collect = serde_json::to_value(&self.collect).expect("a configuration serializes");
         let collect = collect.as_object().into_iter().flatten();
-        let mut settings: BTreeMap<String, String> =
+        let mut settings: Settings =
             collect.map(|(key, value)| (format!("collect.{key}"), value.to_string())).collect();
         let mut insert = |key: &str, value: String| settings.insert(key.to_owned(), value);
         insert("held_out_fraction", self.held_out_fraction.to_string());
@@ -137,21 +136,16 @@ impl OpponentConfig {
             return Ok(());
         }
         let bytes = read_bounded(&path, MAX_SETTINGS_BYTES)?;
-        let recorded = serde_json::from_slice::<BTreeMap<String, String>>(&bytes);
+        let recorded = serde_json::from_slice::<Settings>(&bytes);
         let invalid = |e: serde_json::Error| {
             let problem = format!("no record of settings: {e}");
             TrainingError::from_data(CollectError::Format { path: path.clone(), problem })
         };
-        let current = self.data_settings();
-        for (key, before) in recorded.map_err(invalid)? {
-            let Some(now) = current.get(&key).filter(|now| **now != before) else { continue };
-            let problem = format!(
-                "`{key}` is {now}, but was {before} when the windows were collected; restore it or start \
-                 a new training"
-            );
-            return Err(TrainingError::Config { path: folder.join(CONFIG), problem });
+        let recorded = recorded.map_err(invalid)?;
+        match changed_setting(&recorded, &self.data_settings(), "the windows were collected") {
+            Some(problem) => Err(TrainingError::Config { path: folder.join(CONFIG), problem }),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     /// Reads the windows of one split from the training folder, or collects and writes them; `None` if

@@ -121,6 +121,8 @@ impl Algorithm for CloningConfig {
         ("shards", SHARDS),
         ("adam", ADAM),
     ];
+    // The labels of all demonstrations.
+    const FIXED_KEYS: &'static [&'static str] = &["expert.helper", "gamma", "rollout.rewards"];
 
     fn spec(&self) -> TrainingSpec<'_> {
         let CloningConfig { seed, iterations, rollout, shards, .. } = self;

@@ -158,6 +158,22 @@ impl Trainer for VisualTrainer {
         Ok(parameters)
     }
 
+    fn fixed_keys() -> Vec<&'static str> {
+        // The first decides about the network, the others about the replayed episodes.
+        vec![
+            "action_space",
+            "seed",
+            "n_envs",
+            "n_steps",
+            "tasks",
+            "splits",
+            "image_size",
+            "perception",
+            "behavior",
+            "appearance",
+        ]
+    }
+
     fn network(&self) -> &Network {
         self.setup.model.network()
     }

@@ -6,4 +6,5 @@ mod opponent;
 mod partner;
 mod policies;
 mod ppo_reference;
+mod settings;
 mod training;

@@ -15,18 +15,21 @@ use chaic_training::conformance::{bounds_every_number, refuses_damaged_checkpoin
 use chaic_training::run::checkpoint_bytes;
 use chaic_training::{
     CHECKPOINT, CONFIG, CURVES, Checkpoint, CheckpointError, CurveRecord, INITIAL_WEIGHTS, Learner,
-    Metrics, Phase, Trainer, TrainingError, TrainingRun, metrics,
+    Metrics, Phase, Trainer, TrainingError, TrainingRun, defined_metrics, metrics,
 };
 use serde::{Deserialize, Serialize};
 
 mod configuration;
 mod failed_start;
+mod settings;
 mod validation;
 
 /// File in the folder that interrupts the next validation.
 const INTERRUPT: &str = "interrupt";
 /// File in the folder that makes the score of the next validation infinite.
 const INFINITE: &str = "infinite";
+/// File in the folder that makes the score of the next validation undefined.
+const UNDEFINED: &str = "undefined";
 const WEIGHTS_KIND: &str = "toy 1";
 /// First step with other metrics, in the middle of a record.
 const SECOND_STAGE: u64 = 14;
@@ -120,6 +123,10 @@ impl<const HAS_SCORE: bool> Trainer for Toy<HAS_SCORE> {
         weights::from_bytes(&network(), bytes, WEIGHTS_KIND)
     }
 
+    fn fixed_keys() -> Vec<&'static str> {
+        vec!["a"]
+    }
+
     fn network(&self) -> &Network {
         &self.network
     }
@@ -184,7 +191,9 @@ impl<const HAS_SCORE: bool> Trainer for Toy<HAS_SCORE> {
         let x = f64::from(self.learner.parameters[0]);
         let is_infinite = fs::remove_file(self.folder.join(INFINITE)).is_ok();
         let score = if is_infinite { f64::INFINITY } else { -(x - BEST_X).abs() };
-        Ok(Some((metrics([("x", x), ("score", score)]), bytes)))
+        let is_undefined = fs::remove_file(self.folder.join(UNDEFINED)).is_ok();
+        let score = (!is_undefined).then_some(score);
+        Ok(Some((defined_metrics([("x", Some(x)), ("score", score)]), bytes)))
     }
 }
 

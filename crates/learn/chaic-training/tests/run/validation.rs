@@ -1,12 +1,13 @@
-//! A validation whose metrics are not finite ends the training, and leaves nothing behind.
+//! A validation whose metrics are not finite ends the training, and leaves nothing behind. One without
+//! a score replaces no weights that have one.
 
 use std::fs;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use chaic_training::{CURVES, Trainer as _, TrainingError, TrainingRun};
+use chaic_training::{CURVES, CurveRecord, Phase, Trainer as _, TrainingError, TrainingRun};
 
-use crate::{INFINITE, Toy, ToyConfig, final_files};
+use crate::{INFINITE, Toy, ToyConfig, UNDEFINED, final_files};
 
 static NEVER_STOP: AtomicBool = AtomicBool::new(false);
 
@@ -35,4 +36,31 @@ fn a_score_that_is_not_finite_is_never_the_best() {
     assert!(run.run(&NEVER_STOP, &mut |_| ()).unwrap());
     assert!(start(&whole).run(&NEVER_STOP, &mut |_| ()).unwrap());
     assert!(final_files(&broken) == final_files(&whole));
+}
+
+#[test]
+fn weights_without_a_score_replace_none_that_have_one() {
+    let dir = tempfile::tempdir().unwrap();
+    // Returns the weights after each validation. Those after `last_scored` have no score.
+    let train = |last_scored: u64| {
+        let folder = dir.path().join(last_scored.to_string());
+        let mut weights = Vec::new();
+        let mut report = |record: &CurveRecord| {
+            if record.step >= last_scored {
+                fs::write(folder.join(UNDEFINED), "").unwrap();
+            }
+            if record.phase == Phase::Validation {
+                assert_eq!(record.metrics.contains_key("score"), record.step <= last_scored);
+                weights.push(fs::read(folder.join(Toy::<true>::WEIGHTS)).unwrap());
+            }
+        };
+        assert!(start(&folder).run(&NEVER_STOP, &mut report).unwrap());
+        weights
+    };
+    let scored = train(8);
+    assert!(scored.len() == 3 && scored.iter().all(|weights| *weights == scored[0]));
+    // Without any score, the last weights are kept.
+    let unscored = train(0);
+    assert!(unscored[0] == scored[0]);
+    assert!(unscored[1] != unscored[0] && unscored[2] != unscored[1]);
 }

@@ -102,9 +102,10 @@ pub(super) fn door_frame(setup: &Setup, opening: &Opening) -> Option<[Mesh; 2]> 
     Some([sides.finish(), above.finish()])
 }
 
-/// Adds windows along an interval of outer wall, on its inner side, where no object blocks them.
+/// Adds windows along an interval of outer wall, on its inner side, where no object blocks them. A
+/// window that does not fit in the last mesh begins another one.
 pub(super) fn windows(
-    mesh: &mut Mesh,
+    meshes: &mut Vec<Mesh>,
     setup: &Setup,
     wall: &Wall,
     wall_frame: &WallFrame,
@@ -135,9 +136,13 @@ pub(super) fn windows(
             let has_curtains =
                 matches!(kind, RoomKind::Bedroom | RoomKind::LivingRoom) && !seed.is_multiple_of(4);
             let size = [width, height];
-            window(mesh, setup, wall_frame, [x, sill], size, interval.side);
+            let mut mesh = Mesh::default();
+            window(&mut mesh, setup, wall_frame, [x, sill], size, interval.side);
             if has_curtains {
-                curtains(mesh, wall_frame, [x, sill], size, interval.side, seed);
+                curtains(&mut mesh, wall_frame, [x, sill], size, interval.side, seed);
+            }
+            if !meshes.last_mut().is_some_and(|last| last.append(&mesh)) {
+                meshes.push(mesh);
             }
         }
     }

@@ -15,8 +15,22 @@ use crate::texture::Texture;
 /// Height and thickness of skirting boards, meters.
 const SKIRTING_M: [f32; 2] = [0.085, 0.012];
 
-/// Mesh of a wall with its windows and skirting boards.
-pub(super) fn mesh(setup: &Setup, wall: &Wall, wall_materials: &[Material]) -> Mesh {
+/// Maximum number of intervals on each side of a wall in one mesh: each has a material, and plaster
+/// and skirting boards have two more.
+const MAX_INTERVALS: usize = (Mesh::MAX_MATERIALS - 2) / 2;
+
+/// Maximum number of meshes of all walls of a setup that a world accepts. A room cuts a wall at most
+/// four times. Windows are on both sides, at least 1.2 m apart, on a box that is longer than the
+/// wall by its thickness of at most 5 m. A mesh holds at least 63 windows of four materials.
+pub(super) const MAX_MESHES: usize = {
+    let length_m = Setup::MAX_WALL_LENGTH_M as usize + 5 * Setup::MAX_WALLS;
+    let n_windows = 2 * 10 * length_m / 12;
+    let n_parts = (4 * Setup::MAX_ROOMS + 1).div_ceil(MAX_INTERVALS);
+    (n_parts + 1) * Setup::MAX_WALLS + n_windows / 63
+};
+
+/// Meshes of a wall with its windows and skirting boards: one, unless the wall is long.
+pub(super) fn meshes(setup: &Setup, wall: &Wall, wall_materials: &[Material]) -> Vec<Mesh> {
     let wall_frame = WallFrame::new(wall);
     let cuts = cuts(setup, &wall_frame);
     let mut intervals = Vec::new();
@@ -28,13 +42,23 @@ pub(super) fn mesh(setup: &Setup, wall: &Wall, wall_materials: &[Material]) -> M
         }
     }
     assign_short_intervals(&mut intervals);
-    let mut mesh = Mesh::default();
-    faces(&mut mesh, wall, &wall_frame, wall_materials, &intervals);
+    let (left, right) = intervals.split_at(intervals.len() / 2);
+    let n_parts = left.len().div_ceil(MAX_INTERVALS);
+    let sides = left.chunks(MAX_INTERVALS).zip(right.chunks(MAX_INTERVALS));
+    let part = |(k, (left, right)): (usize, (&[WallInterval], &[WallInterval]))| {
+        let mut mesh = Mesh::default();
+        let has_ends = [k == 0, k + 1 == n_parts];
+        faces(&mut mesh, wall, &wall_frame, wall_materials, [left, right], has_ends);
+        if wall.bottom_m < 0.1 {
+            skirting(&mut mesh, &wall_frame, [left, right]);
+        }
+        mesh
+    };
+    let mut meshes: Vec<Mesh> = sides.enumerate().map(part).collect();
     if wall.bottom_m < 0.1 {
-        skirting(&mut mesh, &wall_frame, &intervals);
         let rooms = super::indoors(setup).map(|r| r.rect);
         let house = rooms.reduce(|a, b| Rect { min: a.min.min(b.min), max: a.max.max(b.max) });
-        let Some(house) = house else { return mesh.finish() };
+        let is_outdoors = |p: Vec2| house.is_some_and(|house| !house.contains(p));
         for interval in intervals.iter().filter(|s| s.room.is_some()) {
             let beyond = wall_frame.point(
                 0.5 * (interval.from + interval.to),
@@ -42,12 +66,18 @@ pub(super) fn mesh(setup: &Setup, wall: &Wall, wall_materials: &[Material]) -> M
             );
             // Alcoves belong to no room: a point is outdoors if it is outside the hull of all
             // rooms.
-            if !house.contains(beyond) {
-                joinery::windows(&mut mesh, setup, wall, &wall_frame, interval);
+            if is_outdoors(beyond) {
+                joinery::windows(&mut meshes, setup, wall, &wall_frame, interval);
             }
         }
     }
-    mesh.finish()
+    let finish = |mesh: Mesh| {
+        let mut mesh = mesh.finish();
+        // A map leaves out meshes above doorways, but not windows that have a mesh of their own.
+        mesh.min.y = mesh.min.y.min(wall.bottom_m);
+        mesh
+    };
+    meshes.into_iter().map(finish).collect()
 }
 
 /// Assigns short intervals at corners and ends of walls to the adjacent room, although its floor
@@ -57,8 +87,9 @@ fn assign_short_intervals(intervals: &mut [WallInterval]) {
     for k in 0..intervals.len() {
         let WallInterval { from, to, side, room } = intervals[k];
         if room.is_none() && to - from < SHORT_INTERVAL_M {
-            let is_near = |s: &&WallInterval| s.side == side && (s.to == from || s.from == to);
-            intervals[k].room = intervals.iter().filter(is_near).find_map(|s| s.room);
+            let room_of = |j: usize| intervals.get(j).filter(|s| s.side == side)?.room;
+            let room = room_of(k.wrapping_sub(1)).or_else(|| room_of(k + 1));
+            intervals[k].room = room;
         }
     }
 }
@@ -69,9 +100,6 @@ fn room_at(setup: &Setup, p: Vec2) -> Option<usize> {
         .iter()
         .position(|r| r.kind != RoomKind::Outdoors && r.rect.expanded(0.02).contains(p))
 }
-
-/// Maximum number of cuts of a wall, including its ends; it limits the work on invalid input.
-const MAX_CUTS: usize = 64;
 
 /// Positions along the wall where a room begins or ends, including both ends of the wall.
 fn cuts(setup: &Setup, wall_frame: &WallFrame) -> Vec<f32> {
@@ -91,24 +119,25 @@ fn cuts(setup: &Setup, wall_frame: &WallFrame) -> Vec<f32> {
     }
     cuts.sort_by(f32::total_cmp);
     cuts.dedup_by(|a, b| (*a - *b).abs() < 0.02);
-    // However short the wall is, and however many rooms it passes, it has two ends.
-    if cuts.len() < 2 || cuts.len() > MAX_CUTS {
-        cuts.truncate(MAX_CUTS - 1);
+    // However short the wall is, it has two ends.
+    if cuts.len() < 2 {
         cuts.push(wall_frame.half.x);
     }
     cuts
 }
 
-/// Adds the closed box of the wall, whose sides are split where rooms meet.
+/// Adds a part of the box of the wall, whose sides are split where rooms meet. The box is closed
+/// where the part has an end of the wall.
 fn faces(
     mesh: &mut Mesh,
     wall: &Wall,
     wall_frame: &WallFrame,
     wall_materials: &[Material],
-    intervals: &[WallInterval],
+    [left, right]: [&[WallInterval]; 2],
+    has_ends: [bool; 2],
 ) {
-    let n = intervals.len() / 2;
-    let cuts = intervals[..n].iter().map(|s| s.from).chain(intervals.last().map(|s| s.to));
+    let n = left.len();
+    let cuts = left.iter().map(|s| s.from).chain(right.last().map(|s| s.to));
     let base = mesh.positions.len();
     for t in cuts {
         for z in [-wall_frame.half.y, wall_frame.half.y] {
@@ -122,13 +151,17 @@ fn faces(
     let at = |k: usize, vertex: usize| base + 4 * k + vertex;
     let unpainted = plaster(wall.color);
     mesh.set_material(unpainted.with_axes(wall_frame.axes()));
-    mesh.quad([at(0, 0), at(0, 2), at(0, 3), at(0, 1)], false);
-    mesh.quad([at(n, 0), at(n, 1), at(n, 3), at(n, 2)], false);
+    if has_ends[0] {
+        mesh.quad([at(0, 0), at(0, 2), at(0, 3), at(0, 1)], false);
+    }
+    if has_ends[1] {
+        mesh.quad([at(n, 0), at(n, 1), at(n, 3), at(n, 2)], false);
+    }
     for k in 0..n {
         mesh.quad([at(k, 1), at(k, 3), at(k + 1, 3), at(k + 1, 1)], false);
         mesh.quad([at(k, 0), at(k + 1, 0), at(k + 1, 2), at(k, 2)], false);
     }
-    for (j, interval) in intervals.iter().enumerate() {
+    for (j, interval) in left.iter().chain(right).enumerate() {
         let k = j % n;
         let wall_material = interval.room.and_then(|k| wall_materials.get(k)).unwrap_or(&unpainted);
         mesh.set_material(wall_material.with_axes(wall_frame.axes()));
@@ -173,10 +206,10 @@ pub(super) fn wall_materials(setup: &Setup) -> Vec<Material> {
     setup.rooms.iter().enumerate().map(wall_material).collect()
 }
 
-fn skirting(mesh: &mut Mesh, wall_frame: &WallFrame, intervals: &[WallInterval]) {
+fn skirting(mesh: &mut Mesh, wall_frame: &WallFrame, [left, right]: [&[WallInterval]; 2]) {
     let [height, thickness] = SKIRTING_M;
     mesh.set_material(Material::new([236, 232, 224], Finish::Glossy));
-    for s in intervals.iter().filter(|s| s.room.is_some()) {
+    for s in left.iter().chain(right).filter(|s| s.room.is_some()) {
         let z = s.side * (wall_frame.half.y + 0.5 * thickness);
         let center = [0.5 * (s.from + s.to), 0.5 * height, z];
         cuboid(mesh, &wall_frame.obb(center, [s.to - s.from, height, thickness]));

@@ -21,6 +21,16 @@ fn floor(min: [f32; 2], max: [f32; 2]) -> Floor {
     Floor { rect: Rect::new(min, max), material: FloorMaterial::Wood, color: [190, 160, 120] }
 }
 
+/// Returns rooms 0.5 m wide over the whole bounds of 200 by 200 m: `n` along z, `n_across` along x.
+fn strips(n: usize, n_across: usize) -> Setup {
+    let at = |k: usize| 1.5 * k as f32 - 99.0;
+    let along = (0..n).map(|k| Rect::new([at(k), -100.0], [at(k) + 0.5, 100.0]));
+    let across = (0..n_across).map(|k| Rect::new([-100.0, at(k)], [100.0, at(k) + 0.5]));
+    let room = |rect| Room { kind: RoomKind::Office, rect };
+    let bounds = Rect::new([-100.0; 2], [100.0; 2]);
+    Setup { bounds, rooms: along.chain(across).map(room).collect(), ..base() }
+}
+
 /// Checks a list to which `fill` gives a number of entries.
 fn check_count(field: &str, max: usize, fill: impl Fn(&mut Setup, usize)) {
     let check = |n: usize| {
@@ -83,4 +93,30 @@ fn crossing_floors_have_a_maximum_number_of_pieces() {
         let problem = setup.check().expect_err("too many pieces").to_string();
         assert_eq!(problem, "floors: cut each other into more than 4096 pieces");
     }
+}
+
+#[test]
+fn ceilings_between_rooms_have_a_maximum_number_of_pieces() {
+    let full = strips(63, 63);
+    assert_eq!(full.check(), Ok(()));
+    let pieces = full.ceiling_pieces().expect("few enough");
+    assert_eq!(pieces.len(), full.rooms.len() + Setup::MAX_CEILING_PIECES);
+    for (n, n_across) in [(64, 63), (120, 120)] {
+        let setup = strips(n, n_across);
+        let problem = setup.check().expect_err("too many pieces").to_string();
+        let expected = "rooms: cut the ceiling between them into more than 4096 pieces";
+        assert_eq!(problem, expected);
+        assert_eq!(Setup { ceiling_m: None, ..setup }.check(), Ok(()));
+    }
+}
+
+#[test]
+fn walls_have_a_maximum_total_length() {
+    let check = |n: usize| {
+        let walls = vec![wall([-1000.0, 0.0], [1000.0, 0.0]); n];
+        Setup { walls, ..base() }.check()
+    };
+    assert_eq!(check(50), Ok(()));
+    let problem = check(51).expect_err("too long").to_string();
+    assert_eq!(problem, "walls (total length): is 102000, expected a number in [0, 100000]");
 }

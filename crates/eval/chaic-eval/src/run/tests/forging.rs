@@ -117,7 +117,7 @@ fn rewrite_run_file(run: &Path, change: impl FnOnce(&mut RunOptions, &mut RunGra
     let (folder, mut options) = RunFolder::read(run).unwrap();
     let mut granted = folder.granted().unwrap().unwrap();
     change(&mut options, &mut granted);
-    folder.write_options(&options, &granted).unwrap();
+    folder.write_options(&options, &granted, None).unwrap();
 }
 
 /// Returns an entry of the grants in `run.json`.

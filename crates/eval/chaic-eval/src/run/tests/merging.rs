@@ -236,7 +236,7 @@ fn parts_played_with_other_commands_are_refused() {
     };
     // The second part has no commands, others, and no valid ones.
     record(0, &format!("[{mine}, {other}]"));
-    assert!(refused().contains("were played with other commands; play all shards with the same"));
+    assert!(refused().contains("were played with other commands or limits; play all shards with"));
     record(1, &format!("[{mine}]"));
     assert!(refused().contains("were played with other commands"));
     record(1, &format!("[{mine}, {other}").replace("a.py", "c.py"));

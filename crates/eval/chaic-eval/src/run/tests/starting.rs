@@ -179,8 +179,84 @@ fn a_task_without_an_episode_or_a_helper_that_plays_it_is_refused() {
         assert!(error.is_usage() && error.to_string() == problem, "{error}");
         assert!(!path.exists());
     }
+    // An earlier version started such a run, or a file was removed since.
+    let started = dir.path().join("started");
+    drop(Run::open(&started, FolderMode::New, &all, &helpers.0).unwrap());
+    let error = Run::open(&started, FolderMode::Resume, &all, &helpers).unwrap_err();
+    assert!(error.is_usage() && error.to_string() == "no weights of obstacle", "{error}");
     let low = RunRequest { tasks: Some(vec![TaskId::LowTarget]), ..all };
     Run::open(&path, FolderMode::New, &low, &helpers).unwrap();
+}
+
+/// Helper `viewer` of another language, which requests these images.
+struct Viewers(SensorConfig);
+
+struct Viewer(SensorConfig);
+
+impl Agent for Viewer {
+    fn sensors(&self) -> SensorConfig {
+        self.0
+    }
+
+    fn reset(&mut self, _: &Briefing) {}
+
+    fn act(&mut self, _: &Observation) -> std::result::Result<Action, AgentError> {
+        Ok(Action::Wait { frames: 10 })
+    }
+
+    fn isolation(&self) -> Option<String> {
+        Some("trusted".to_owned())
+    }
+}
+
+impl HelperRegistry for Viewers {
+    fn names(&self) -> Vec<String> {
+        vec!["viewer".to_owned()]
+    }
+
+    fn make(&self, name: &str, _: PlannerRules) -> Option<Helper> {
+        (name == "viewer").then(|| Helper { agent: Box::new(Viewer(self.0)), grants: Grants::IDS })
+    }
+}
+
+#[test]
+fn a_helper_with_other_images_does_not_resume_a_run() {
+    let source = episode_files(&[TaskId::LowTarget], 1);
+    let dir = tempfile::tempdir().unwrap();
+    let request = request(&source, &["viewer"]);
+    let open = |name: &str, access, sensors| {
+        let path = dir.path().join(name);
+        Run::open(&path, access, &request, &Viewers(sensors)).map(drop)
+    };
+    let depth = SensorConfig { ids: false, ..SensorConfig::DEPTH_AND_IDS };
+    let small = SensorConfig { image_size: 64, ..depth };
+    let none = SensorConfig::NONE;
+    for (name, sensors) in [("depth", depth), ("none", none)] {
+        open(name, FolderMode::New, sensors).unwrap();
+        open(name, FolderMode::Resume, sensors).unwrap();
+    }
+    for (name, sensors, words) in [
+        ("depth", small, ["viewer requests depth of 64 pixels now", "has depth of 512 pixels;"]),
+        ("depth", none, ["viewer requests no images now", "has depth of 512 pixels;"]),
+        ("none", small, ["viewer requests depth of 64 pixels now", "has no images;"]),
+    ] {
+        let error = open(name, FolderMode::Resume, sensors).unwrap_err();
+        let text = error.to_string();
+        assert!(error.is_usage() && words.iter().all(|word| text.contains(word)), "{text}");
+    }
+    // A merged run has the images of its parts.
+    let run_file = |name: &str| dir.path().join(name).join("run.json");
+    drop(merge(&dir.path().join("merged"), &[dir.path().join("depth")]).unwrap());
+    let text = fs::read_to_string(run_file("depth")).unwrap();
+    assert_eq!(fs::read_to_string(run_file("merged")).unwrap(), text);
+    let parts = ["depth", "none"].map(|name| dir.path().join(name));
+    let error = merge(&dir.path().join("mixed"), &parts).unwrap_err().to_string();
+    assert!(error.contains("different runs"), "{error}");
+    // A run of an older version records none.
+    let mut older: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert!(older.as_object_mut().unwrap().remove("images").is_some());
+    fs::write(run_file("depth"), older.to_string()).unwrap();
+    open("depth", FolderMode::Resume, small).unwrap();
 }
 
 #[test]

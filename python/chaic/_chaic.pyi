@@ -363,6 +363,7 @@ def evaluate(
     jobs: int,
     resume: bool,
     shard: str | None,
+    limit_s: float,
     isolation: Mapping[str, Any] | None,
     on_result: Callable[[str, str, int, float | None], bool],
     options: Mapping[str, Any],
@@ -371,8 +372,8 @@ def evaluate(
     (`on_result` returned false).
 
     `helpers` are names, each with a callable that creates a helper for each episode, or `None` for a built-in
-    helper. `granted`, `images` and `image_size` apply to the Python helpers. `isolation` describes how to run
-    them in processes of their own."""
+    helper. `granted`, `images`, `image_size` and `limit_s` apply to the Python helpers; the run records the last one,
+    which the caller enforces. `isolation` describes how to run them in processes of their own."""
 def serve(maker: Callable[[], Any], images: Sequence[str], image_size: int, output: int) -> None:
     """Serves helpers that `maker` creates on standard input and the descriptor `output`, until the input is closed."""
 def merge(out: str | PathLike[str], runs: Sequence[str | PathLike[str]]) -> str:

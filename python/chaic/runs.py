@@ -12,6 +12,7 @@ import sys
 import tempfile
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
@@ -48,6 +49,9 @@ class Helper(Protocol):
 Maker = Callable[[], Any]
 
 
+#: Time limit of one action, seconds.
+DEFAULT_LIMIT_S = 600.0
+
 #: Maximum time limit of an isolated helper, seconds; about 30 years.
 MAX_LIMIT_S = 1e9
 
@@ -82,7 +86,7 @@ def evaluate(
     resume: bool = False,
     shard: str | None = None,
     quiet: bool = False,
-    limit_s: float = 600.0,
+    limit_s: float | None = None,
     isolate: bool = False,
     read: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = (),
     **options: Any,
@@ -99,9 +103,9 @@ def evaluate(
     ``chaic report``, ``chaic verify`` and ``chaic replay`` read the folder.
 
     A helper that raises an exception scores zero for that episode, with the traceback in results.jsonl, and the run
-    continues. The same holds for one that needs more than ``limit_s`` seconds for one action: an exception is raised in it,
-    which handlers of ``Exception`` do not catch. That stops Python code, but a call into C only when it returns. A helper that may hang there should be a separate
-    process (docs/subprocess-helpers.md).
+    continues. The same holds for one that needs more than ``limit_s`` seconds (600 by default) for one action: an exception
+    is raised in it, which handlers of ``Exception`` do not catch. That stops Python code, but a call into C only when it
+    returns. A helper that may hang there should be a separate process (docs/subprocess-helpers.md).
 
     ``isolate=True`` runs the helpers in separate processes in the sandbox of docs/threat-model.md. There a helper reads its
     briefings and observations, installed packages, the file that defines it, and the paths in ``read``. Each process serves
@@ -125,6 +129,9 @@ def evaluate(
             "the helpers of one run must request the same grants and images; evaluate them in separate runs"
         )
     grants, images, image_size = next(iter(requirements), _requirements(Helper))
+    path = Path(out)
+    if limit_s is None:
+        limit_s = (_recorded_limit_s(path) if resume else None) or DEFAULT_LIMIT_S
     watchdog = Watchdog(limit_s)
     helpers: list[tuple[str, Maker | None]] = [(name, None) for name in baselines]
     helpers += [(name, partial(TimeLimitedHelper, maker, watchdog)) for name, maker in makers.items()]
@@ -150,7 +157,6 @@ def evaluate(
             _print(f"{n_finished}: {name}, {episode}, seed {seed}: {score}")
         return True
 
-    path = Path(out)
     with watchdog:
         report = _chaic.evaluate(
             helpers,
@@ -161,6 +167,7 @@ def evaluate(
             jobs=(os.cpu_count() or 1) if jobs is None else jobs,
             resume=resume,
             shard=shard,
+            limit_s=limit_s,
             isolation=isolation,
             on_result=on_result,
             options=options,
@@ -180,6 +187,15 @@ def merge(
     if not quiet:
         _print(report)
     return Run(out)
+
+
+def _recorded_limit_s(path: Path) -> float | None:
+    """Returns the time limit of the run in a folder, if it has one on record."""
+    # `_chaic.evaluate` reports a damaged record.
+    with suppress(OSError, ValueError, LookupError, TypeError, AttributeError, StopIteration):
+        limits = json.loads((path / "run.json").read_bytes())["granted"]["limits_s"]
+        return float(next(iter(limits.values())))
+    return None
 
 
 def _makers(helper: Maker | Mapping[str, Maker] | None) -> dict[str, Maker]:

@@ -257,6 +257,20 @@ def test_a_resumed_run_has_the_options_of_its_start(tmp_path):
     assert run.options["split"] == "train" and len(run.results()) == 1
 
 
+def test_a_resumed_run_has_the_time_limit_of_its_start(tmp_path):
+    class Interrupts(Turner):
+        def act(self, observation):
+            raise KeyboardInterrupt
+
+    start = {"out": tmp_path / "run", **OPTIONS}
+    with pytest.raises(KeyboardInterrupt):
+        chaic.evaluate({"turner": Interrupts}, limit_s=30.5, **start)
+    with pytest.raises(ValueError, match=r"limit_s of turner is 5 now, but .*run\.json has 30\.5"):
+        chaic.evaluate(Turner, limit_s=5, resume=True, **start)
+    run = chaic.evaluate(Turner, resume=True, **start)
+    assert len(run.results()) == 1
+
+
 def test_a_resumed_run_has_the_images_of_its_start(tmp_path):
     class Interrupts(Turner):
         def act(self, observation):

@@ -67,30 +67,21 @@ pub static HELPERS: [HelperInfo; 11] = [
         name: "infer_no_watching",
         title: "Infer, no watching",
         about: "infer that does not follow the partner",
-        make: |rules, factory| {
-            let options = InferOptions { follows_partner: false, ..InferOptions::ALL };
-            Box::new(infer(rules, factory, options, false))
-        },
+        make: |rules, factory| Box::new(infer(rules, factory, InferOptions::NO_WATCHING, false)),
         grants: planner_grants,
     },
     HelperInfo {
         name: "infer_no_planner",
         title: "Infer, rules",
         about: "infer that follows the oracle's rules",
-        make: |rules, factory| {
-            let options = InferOptions { uses_team_planner: false, ..InferOptions::ALL };
-            Box::new(infer(rules, factory, options, false))
-        },
+        make: |rules, factory| Box::new(infer(rules, factory, InferOptions::NO_PLANNER, false)),
         grants: planner_grants,
     },
     HelperInfo {
         name: "infer_no_constraint",
         title: "Infer, goal only",
         about: "infer that assumes an unimpaired adult",
-        make: |rules, factory| {
-            let options = InferOptions { infers_constraint: false, ..InferOptions::ALL };
-            Box::new(infer(rules, factory, options, false))
-        },
+        make: |rules, factory| Box::new(infer(rules, factory, InferOptions::NO_CONSTRAINT, false)),
         grants: planner_grants,
     },
     HelperInfo {

@@ -69,6 +69,11 @@ pub trait HelperRegistry: Sync {
         self.fallback().map_or(Ok(()), |registry| registry.check_task(name, task))
     }
 
+    /// Returns the time limit of one action of a helper in seconds, if the run is to record it in `run.json`.
+    fn limit_s(&self, name: &str) -> Option<f64> {
+        self.fallback()?.limit_s(name)
+    }
+
     /// Receives the run folder before `run.json` is written and on every resume. Override it to keep
     /// records there.
     ///

@@ -26,7 +26,8 @@ impl Episode {
     /// `obstacle/gen/123` generates it.
     #[new]
     fn new(py: Python<'_>, id: &str) -> PyResult<Episode> {
-        let episode = py.detach(|| find_episode(id)).map_err(mistake)?;
+        let episode = py.detach(|| find_episode(id));
+        let episode = episode.map_err(|e| if e.is_usage() { mistake(e) } else { failure(e) })?;
         Ok(Episode(Arc::new(episode)))
     }
 

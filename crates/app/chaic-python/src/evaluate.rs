@@ -38,6 +38,8 @@ struct PyHelperRegistry<'a> {
     makers: Vec<(String, Py<PyAny>)>,
     grants: Grants,
     sensors: SensorConfig,
+    /// Time limit of one action of a Python helper, seconds.
+    limit_s: f64,
     /// Processes of the Python helpers, in their order; empty for helpers in this process.
     isolated: Vec<IsolatedHelper>,
     /// Flag that stops the run.
@@ -118,6 +120,10 @@ impl HelperRegistry for PyHelperRegistry<'_> {
             Err(error) => Box::new(FailedAgent::in_this_process(error, SensorConfig::NONE)),
         };
         Some(Helper { agent, grants: self.grants })
+    }
+
+    fn limit_s(&self, name: &str) -> Option<f64> {
+        self.maker(name).map(|_| self.limit_s)
     }
 
     fn fallback(&self) -> Option<&dyn HelperRegistry> {
@@ -222,10 +228,10 @@ pub fn merge(py: Python<'_>, out: PathBuf, runs: Vec<PathBuf>) -> PyResult<Strin
 /// (`on_result` returned false).
 ///
 /// `helpers` are names, each with a callable that creates a helper for each episode, or `None` for a built-in
-/// helper. `granted`, `images` and `image_size` apply to the Python helpers. `isolation` describes how to run
-/// them in processes of their own.
+/// helper. `granted`, `images`, `image_size` and `limit_s` apply to the Python helpers; the run records the last one,
+/// which the caller enforces. `isolation` describes how to run them in processes of their own.
 #[pyfunction]
-#[pyo3(signature = (helpers, out, *, granted, images, image_size, jobs, resume, shard, isolation, on_result, options))]
+#[pyo3(signature = (helpers, out, *, granted, images, image_size, jobs, resume, shard, limit_s, isolation, on_result, options))]
 #[allow(clippy::too_many_arguments)]
 pub fn evaluate(
     py: Python<'_>,
@@ -237,6 +243,7 @@ pub fn evaluate(
     #[pyo3(from_py_with = crate::error::n_jobs)] jobs: u32,
     resume: bool,
     shard: Option<&str>,
+    limit_s: f64,
     isolation: Option<&Bound<'_, PyDict>>,
     on_result: &Bound<'_, PyAny>,
     options: &Bound<'_, PyDict>,
@@ -273,7 +280,7 @@ pub fn evaluate(
     let isolated = isolation.map_or(Ok(Vec::new()), |options| {
         IsolatedHelper::create_all(&options, &own_names, grants, &masked)
     })?;
-    let helpers = PyHelperRegistry { built_in, makers, grants, sensors, isolated, stop };
+    let helpers = PyHelperRegistry { built_in, makers, grants, sensors, limit_s, isolated, stop };
     let shard = shard.map_or(Ok(Shard::WHOLE), |shard| shard.parse().map_err(mistake))?;
     let access = if resume { FolderMode::Resume } else { FolderMode::New };
     let on_result = on_result.clone().unbind();

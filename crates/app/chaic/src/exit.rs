@@ -80,8 +80,8 @@ pub fn code_of(error: &anyhow::Error) -> u8 {
         || error.downcast_ref().is_some_and(StoreError::is_usage)
         || error.downcast_ref().is_some_and(StudyError::is_usage)
         || error.downcast_ref().is_some_and(TrainingError::is_usage)
-        || error.is::<Refusal>()
-        || error.is::<SplitError>();
+        || error.downcast_ref().is_some_and(SplitError::is_usage)
+        || error.is::<Refusal>();
     if is_usage { USAGE } else { FAILED }
 }
 
@@ -108,7 +108,19 @@ mod tests {
         };
         let unknown_helper = || EnvError::UnknownHelper { name: "x".to_owned(), known: Vec::new() };
         let (name, problem) = ("map.txt".to_owned(), "line 2".to_owned());
-        let cases: [(anyhow::Error, u8); 16] = [
+        let no_episode = || SplitError::NoSuchEpisode { id: "obstacle/test/99".to_owned() };
+        let of_other_generators = || {
+            let (expected, found) = ("1".to_owned(), "2".to_owned());
+            SplitError::NotStandard { id: "obstacle/standard/000".to_owned(), expected, found }
+        };
+        let of_study = |problem| StudyError::Episode { path: folder(), problem };
+        let cases: [(anyhow::Error, u8); 22] = [
+            (no_episode().into(), USAGE),
+            (of_other_generators().into(), FAILED),
+            (EvalError::from(no_episode()).into(), USAGE),
+            (EvalError::from(of_other_generators()).into(), FAILED),
+            (of_study(no_episode()).into(), USAGE),
+            (of_study(of_other_generators()).into(), FAILED),
             (no_key().into(), USAGE),
             (EnvError::Registry(no_key().into()).into(), USAGE),
             (not_named.into(), USAGE),

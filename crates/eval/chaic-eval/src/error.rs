@@ -193,7 +193,8 @@ impl EvalError {
     /// Returns whether the caller's request caused the error.
     pub fn is_usage(&self) -> bool {
         match self {
-            EvalError::Options(_) | EvalError::OptionDiffers { .. } | EvalError::Split(_) => true,
+            EvalError::Options(_) | EvalError::OptionDiffers { .. } => true,
+            EvalError::Split(error) => error.is_usage(),
             EvalError::Env(error) => error.is_usage(),
             _ => false,
         }

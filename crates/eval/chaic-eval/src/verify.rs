@@ -347,7 +347,10 @@ impl TraceVerifier<'_> {
         if self.chaic.as_ref().is_some_and(|chaic| *chaic != header.chaic) {
             return Ok(Some("run.json names another version of chaic".to_owned()));
         }
-        let episode = self.folder.episode(self.options, &key)?;
+        let episode = match self.folder.episode(self.options, &key) {
+            Err(EvalError::Split(problem)) => return Ok(Some(problem.to_string())),
+            episode => episode?,
+        };
         let rules = self.rules.planner;
         let helper = helper_registry::find(self.helpers, &key.helper, rules).ok();
         let name = self.options.partner.as_deref();

@@ -3,7 +3,7 @@
 
 use std::fmt::Write as _;
 
-/// License of all generated data, as an SPDX identifier.
+/// License of data in which programs decide, as an SPDX identifier.
 pub const LICENSE: &str = "MIT";
 
 /// Facts about a data set for its card and its metadata.
@@ -23,6 +23,8 @@ pub struct DatasetDescription {
     pub biases: Vec<&'static str>,
     /// Statement about personal data.
     pub personal_information: String,
+    /// License as an SPDX identifier; `None` if chaic cannot give one ([`common::NO_LICENSE`]).
+    pub license: Option<&'static str>,
     /// Tags for catalogues of data sets.
     pub tags: &'static [&'static str],
     /// Files of one kind.
@@ -99,6 +101,9 @@ pub mod common {
     /// Statement about personal data, for data without decisions of real people.
     pub const NO_PERSONAL_INFORMATION: &str =
         "None. All people are simulated, and no recording of a real person was used.";
+    /// Statement about the license of data that hold, or can hold, decisions of real people.
+    pub const NO_LICENSE: &str = "Not stated: chaic cannot license decisions of real people. Before the data are shared, the organizer of \
+        the study or game must state a license that the consent of the people allows.";
     /// Statement about effects on society.
     pub const SOCIAL_IMPACT: &str = "Helpers trained on simulated people with impairments can fail with real ones. The data must not \
         be the only evidence that an assistant is safe or useful for a person with a disability.";
@@ -114,7 +119,8 @@ impl DatasetDescription {
     /// Returns the card in Markdown, with the header that Hugging Face reads.
     pub fn to_markdown(&self) -> String {
         let mut text = String::from("---\n");
-        let _ = writeln!(text, "license: {}", LICENSE.to_lowercase());
+        let license = self.license.map_or_else(|| "other".to_owned(), str::to_lowercase);
+        let _ = writeln!(text, "license: {license}");
         let _ = writeln!(text, "pretty_name: {:?}", self.title);
         text.push_str("task_categories:\n- robotics\ntags:\n");
         for tag in self.tags {
@@ -139,6 +145,7 @@ impl DatasetDescription {
         section("Biases", &self.biases);
         section("Effects on society", &[common::SOCIAL_IMPACT]);
         section("Personal data", &[self.personal_information.as_str()]);
+        section("License", &[self.license.unwrap_or(common::NO_LICENSE)]);
         self.write_content(&mut text);
         text
     }

@@ -3,7 +3,7 @@
 
 use serde_json::{Value, json};
 
-use crate::card::{DataType, DatasetDescription, Field, LICENSE, Place, common};
+use crate::card::{DataType, DatasetDescription, Field, Place, common};
 
 /// Reference that a user of the data cites.
 const CITATION: &str = "Du, W., Lyu, Q., Shan, J., Qi, Z., Zhang, H., Chen, S., Peng, A., Shu, T., Lee, K., Dariush, B., \
@@ -35,6 +35,10 @@ pub fn metadata(id: &str, description: &DatasetDescription) -> Value {
         .iter()
         .map(|field| field_metadata(records.name, records.files, field))
         .collect();
+    let license = description.license.map_or_else(
+        || common::NO_LICENSE.to_owned(),
+        |license| format!("https://spdx.org/licenses/{license}.html"),
+    );
     json!({
         "@context": context(),
         "@type": "sc:Dataset",
@@ -44,7 +48,7 @@ pub fn metadata(id: &str, description: &DatasetDescription) -> Value {
         ],
         "name": id,
         "description": description.summary,
-        "license": format!("https://spdx.org/licenses/{LICENSE}.html"),
+        "license": license,
         "version": env!("CARGO_PKG_VERSION"),
         "creator": {"@type": "sc:Organization", "name": "The chaic authors"},
         "citeAs": CITATION,

@@ -6,7 +6,9 @@ use std::path::Path;
 use chaic_episodes::{Episode, GeneratorSeeds, Split, generate_episode};
 use chaic_files::{create_folders, write_atomically};
 
-use crate::card::{DataType, DatasetDescription, Field, FileGroup, Place, RecordSet, common};
+use crate::card::{
+    DataType, DatasetDescription, Field, FileGroup, LICENSE, Place, RecordSet, common,
+};
 use crate::error::ExportError;
 use crate::folder::{NewFolder, write_description};
 
@@ -159,6 +161,7 @@ fn description(origin: Origin, n: usize) -> DatasetDescription {
         ],
         biases: common::BIASES.to_vec(),
         personal_information: common::NO_PERSONAL_INFORMATION.to_owned(),
+        license: Some(LICENSE),
         tags: &["chaic", "embodied-ai", "human-ai-cooperation", "simulation", "accessibility"],
         files: vec![FileGroup {
             name: "episode-files",

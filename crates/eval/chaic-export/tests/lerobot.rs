@@ -134,7 +134,7 @@ fn the_card_says_whether_real_people_decided() {
     repeated.header.people[AgentId::PARTNER.index()].recording =
         Some("0123456789abcdef".to_owned());
     continued.header.branch_of = Some(BranchPoint::new(b"another trace", 1));
-    // Returns the statement about personal data, and the biases.
+    // Returns the statement about personal data, and the number of biases. Only simulated people have a license.
     let described = |traces: &[&Trace]| {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("set");
@@ -151,6 +151,12 @@ fn the_card_says_whether_real_people_decided() {
         for text in biases.iter().map(|bias| bias.as_str().unwrap()).chain([personal.as_str()]) {
             assert!(card.contains(text), "{text}: {card}");
         }
+        let license = metadata["license"].as_str().unwrap();
+        let is_simulated = traces.iter().all(|trace| **trace == simulated);
+        assert_eq!(card.starts_with("---\nlicense: mit\n"), is_simulated, "{card}");
+        assert_eq!(card.starts_with("---\nlicense: other\n"), !is_simulated, "{card}");
+        assert_eq!(license == "https://spdx.org/licenses/MIT.html", is_simulated, "{license}");
+        assert_eq!(card.contains(license), !is_simulated, "{card}");
         (personal, biases.len())
     };
     let (none, n_biases) = described(&[&simulated]);

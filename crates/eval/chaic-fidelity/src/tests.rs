@@ -161,6 +161,7 @@ fn states(plan: &Experiment) -> Vec<PartState> {
             perception: Default::default(),
             isolation: Default::default(),
             weights: Default::default(),
+            limits_s: Default::default(),
         });
         PartState { part, planned, results, environments: Environments::default(), granted }
     };

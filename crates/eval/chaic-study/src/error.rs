@@ -51,10 +51,11 @@ pub enum StudyError {
 impl StudyError {
     /// Returns whether the caller's request caused the error.
     pub fn is_usage(&self) -> bool {
-        matches!(
-            self,
-            StudyError::Definition { .. } | StudyError::Episode { .. } | StudyError::Code(_)
-        )
+        match self {
+            StudyError::Definition { .. } | StudyError::Code(_) => true,
+            StudyError::Episode { problem, .. } => problem.is_usage(),
+            _ => false,
+        }
     }
 }
 

@@ -41,17 +41,17 @@ pub static EXPERTS: [ExpertInfo; 8] = [
     ExpertInfo {
         name: "infer_no_watching",
         knows_goal: false,
-        policy: || infer(InferOptions { follows_partner: false, ..InferOptions::ALL }),
+        policy: || infer(InferOptions::NO_WATCHING),
     },
     ExpertInfo {
         name: "infer_no_planner",
         knows_goal: false,
-        policy: || infer(InferOptions { uses_team_planner: false, ..InferOptions::ALL }),
+        policy: || infer(InferOptions::NO_PLANNER),
     },
     ExpertInfo {
         name: "infer_no_constraint",
         knows_goal: false,
-        policy: || infer(InferOptions { infers_constraint: false, ..InferOptions::ALL }),
+        policy: || infer(InferOptions::NO_CONSTRAINT),
     },
     ExpertInfo { name: "infer_known_goal", knows_goal: true, policy: || infer(InferOptions::ALL) },
     ExpertInfo { name: "follow", knows_goal: false, policy: || Box::<FollowPolicy>::default() },

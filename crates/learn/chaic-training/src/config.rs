@@ -61,7 +61,27 @@ pub fn read_config_with<T: Trainer>(
 fn parse_assignment(text: &str) -> Result<Table, String> {
     let (key, value) = text.split_once('=').ok_or("expected KEY=VALUE")?;
     let as_written = toml::from_str(&format!("{key} = {value}"));
-    as_written.or_else(|_| parse(&format!("{key} = {}", toml::Value::from(value))))
+    as_written.or_else(|_| match large_integer(value.trim()) {
+        Some(problem) => Err(problem),
+        None => parse(&format!("{key} = {}", toml::Value::from(value))),
+    })
+}
+
+/// Returns a message about an integer that exceeds 64 bits; `None` for other text.
+fn large_integer(literal: &str) -> Option<String> {
+    let without_separators = literal.replace('_', "");
+    let (prefix, rest) = without_separators.split_at_checked(2).unwrap_or_default();
+    let (digits, radix) = match prefix {
+        "0x" => (rest, 16),
+        "0o" => (rest, 8),
+        "0b" => (rest, 2),
+        _ => (without_separators.as_str(), 10),
+    };
+    let unsigned = digits.strip_prefix(['+', '-']).unwrap_or(digits);
+    let is_integer = !unsigned.is_empty() && unsigned.chars().all(|c| c.is_digit(radix));
+    (is_integer && i64::from_str_radix(digits, radix).is_err()).then(|| {
+        format!("{literal} exceeds 64 bits; integers are from {} to {}", i64::MIN, i64::MAX)
+    })
 }
 
 /// Returns the complete table of a configuration with one assignment merged into it. Old names of
@@ -208,7 +228,9 @@ pub fn config_text<T: Trainer>(config: &T::Config) -> String {
 fn parse<R: DeserializeOwned>(text: &str) -> Result<R, String> {
     toml::from_str(text).map_err(|error| {
         let before = error.span().and_then(|span| text.get(..span.start));
-        let mut message = error.message().replace('\n', " ");
+        let literal = error.span().and_then(|span| text.get(span));
+        let mut message =
+            literal.and_then(large_integer).unwrap_or_else(|| error.message().replace('\n', " "));
         // A key that occurs twice under one name is called a duplicate key.
         if message.starts_with("duplicate field") {
             message += ": it is set under its current and under its old name; remove one";
@@ -237,6 +259,21 @@ mod tests {
     }
 
     #[test]
+    fn integers_beyond_64_bits_are_named() {
+        let huge = "9".repeat(50);
+        for literal in
+            ["9223372036854775808", "-9223372036854775809", &huge, "0x1_0000000000000000"]
+        {
+            let problem = parse::<Table>(&format!("a = 1\n[b]\nc = {literal}\n")).unwrap_err();
+            let expected = format!("line 3: {literal} exceeds 64 bits; integers are from -9223");
+            assert!(problem.starts_with(&expected), "{problem}");
+        }
+        for other in ["", "-", "9223372036854775807", "0xff", "1e30", "99999999999999999999.txt"] {
+            assert_eq!(large_integer(other), None, "{other}");
+        }
+    }
+
+    #[test]
     fn assignments_are_toml_or_text_and_merge_into_tables() {
         let mut table: Table = toml::from_str("a = 1\n[b]\nc = 2\nd = 3\n").unwrap();
         for assignment in ["b.c=4", "b.e = [\"x\", \"y\"]", "f=../some file", "b.d=true"] {
@@ -244,6 +281,8 @@ mod tests {
         }
         let expected = "a = 1\nf = \"../some file\"\n[b]\nc = 4\nd = true\ne = [\"x\", \"y\"]\n";
         assert_eq!(table, toml::from_str(expected).unwrap());
+        let large = parse_assignment("b.c=99_999_999_999_999_999_999").unwrap_err();
+        assert!(large.starts_with("99_999_999_999_999_999_999 exceeds 64 bits"), "{large}");
         for wrong in ["a", "", "=3", "a b=3"] {
             let problem = parse_assignment(wrong).unwrap_err();
             assert!(!problem.is_empty() && !problem.contains('\n'), "{wrong}: {problem}");

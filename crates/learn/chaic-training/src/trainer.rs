@@ -70,9 +70,9 @@ pub trait Trainer: Sized {
     /// If the file does not fit the network, or a value is not finite.
     fn read_weights(config: &Self::Config, weights: &[u8]) -> Result<Vec<f32>, WeightsError>;
 
-    /// Returns the keys of the configuration on which data of the folder, recorded positions or the best
-    /// score depend, such as `rollout.tasks`. A training is resumed only with the same values. Each key has
-    /// a value in every configuration; that of a table stands for all of its keys.
+    /// Returns the keys of the configuration on which the network, data of the folder, recorded positions or
+    /// the best score depend, such as `rollout.tasks`. A training is resumed only with the same values. Each
+    /// key has a value in every configuration; that of a table stands for all of its keys.
     fn fixed_keys() -> Vec<&'static str> {
         Vec::new()
     }

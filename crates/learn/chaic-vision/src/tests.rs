@@ -267,6 +267,30 @@ fn a_training_writes_a_checkpoint_and_readable_weights() {
 }
 
 #[test]
+fn a_training_keeps_its_blocks_and_seed() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("training");
+    let quiet = &mut |_: &str| ();
+    let run = TrainingRun::<DetectorLearner>::start(&out, &tiny(), None, quiet, &NEVER_STOP);
+    drop(run.unwrap());
+    let text = std::fs::read_to_string(out.join(CONFIG)).unwrap();
+    for (line, other, problem) in [
+        (
+            "blocks = \"depthwise\"",
+            "blocks = \"dense\"",
+            "`blocks` is \"dense\", but was \"depthwise\"",
+        ),
+        ("seed = 1", "seed = 2", "`seed` is 2, but was 1"),
+    ] {
+        assert!(text.contains(line), "{text}");
+        std::fs::write(out.join(CONFIG), text.replacen(line, other, 1)).unwrap();
+        let refused = TrainingRun::<DetectorLearner>::resume(&out, quiet, &NEVER_STOP);
+        let refused = refused.err().unwrap();
+        assert!(refused.is_usage() && refused.to_string().contains(problem), "{refused}");
+    }
+}
+
+#[test]
 fn the_bundled_detector_finds_most_objects() {
     let trained = TrainedDetector::built_in();
     let (split, config) = (DatasetSplit::Validation, ViewConfig::NATURAL);

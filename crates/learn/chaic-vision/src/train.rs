@@ -453,6 +453,12 @@ impl Trainer for DetectorLearner {
         Ok([trained.parameters, second_stage].concat())
     }
 
+    fn fixed_keys() -> Vec<&'static str> {
+        // The first decides about the network. The second draws the initial parameters, by which the training
+        // knows whether the second stage is trained.
+        vec!["blocks", "seed"]
+    }
+
     fn network(&self) -> &Network {
         &self.layout
     }

@@ -151,7 +151,9 @@ const MAX_ATTEMPTS: usize = 4;
 /// object.
 const MAX_NEAR_FRACTION: f32 = 0.1;
 const NEAR_M: f32 = 0.3;
-/// Minimum pixels of the aimed object.
+/// Side of images to which numbers of pixels refer.
+const REFERENCE_SIZE_PX: u32 = 512;
+/// Minimum pixels of the aimed object in an image of [`REFERENCE_SIZE_PX`].
 const MIN_AIMED_PX: usize = 24;
 
 /// Maximum extent of added small objects and maximum height of surfaces below them, meters.
@@ -343,7 +345,8 @@ impl SyntheticViews {
         let (eye, yaw_rad) = match aimed_at {
             Some(entity) => {
                 let [near_m, far_m] = self.config.distance_m;
-                let far_m = max_visible_distance_m(scene, entity).clamp(1.5 * near_m, far_m);
+                let visible_m = max_visible_distance_m(object_size_m(scene, entity), size_px);
+                let far_m = visible_m.clamp(1.5 * near_m, far_m);
                 let [near, far] = [near_m, far_m].map(log2);
                 let distance_m = exp2(rng.range(near, far));
                 let direction = yaw_rotation(rng.range(-PI, PI)) * Vec3::NEG_Z;
@@ -377,7 +380,7 @@ impl SyntheticViews {
         let n_near = depth_m.iter().filter(|d| **d < NEAR_M).count();
         let n_aimed = aimed_at.map(|e| ids.iter().filter(|id| **id == e.0).count());
         if n_near as f32 > MAX_NEAR_FRACTION * depth_m.len() as f32
-            || n_aimed.is_some_and(|n| n < MIN_AIMED_PX)
+            || n_aimed.is_some_and(|n| n < min_aimed_px(size_px))
         {
             return None;
         }
@@ -543,13 +546,24 @@ fn target_position(scene: &ViewScene, entity: EntityId) -> Vec3 {
     }
 }
 
-/// Returns the distance at which an object covers about 41 pixels of a 512x512 image, meters: the
-/// focal length is 256 pixels, and (256 / 40)² = 41.
-fn max_visible_distance_m(scene: &ViewScene, entity: EntityId) -> f32 {
+/// Returns the minimum number of pixels of the aimed object: the fraction of the image is the same at all
+/// sizes.
+fn min_aimed_px(size_px: u32) -> usize {
+    let [side_px, reference_px] = [size_px, REFERENCE_SIZE_PX].map(|px| px as usize);
+    (MIN_AIMED_PX * side_px * side_px).div_ceil(reference_px * reference_px)
+}
+
+fn object_size_m(scene: &ViewScene, entity: EntityId) -> [f32; 3] {
     let class = scene.labels.get(usize::from(entity.0)).and_then(|label| class_of(*label));
-    let mut size_m = class.map_or([1.0; 3], |class| class.info().size_m);
+    class.map_or([1.0; 3], |class| class.info().size_m)
+}
+
+/// Returns the distance at which an object covers about 41 pixels of the image, meters: the focal length of
+/// an image of 512 pixels is 256 pixels, and (256 / 40)² = 41.
+fn max_visible_distance_m(mut size_m: [f32; 3], size_px: u32) -> f32 {
     size_m.sort_by(f32::total_cmp);
-    40.0 * (size_m[1] * size_m[2]).sqrt()
+    let scale = size_px as f32 / REFERENCE_SIZE_PX as f32;
+    40.0 * scale * (size_m[1] * size_m[2]).sqrt()
 }
 
 /// Base-2 logarithm, piecewise linear between powers of two; equal bits on every machine.
@@ -564,4 +578,16 @@ fn log2(x: f32) -> f32 {
 fn exp2(x: f32) -> f32 {
     let exponent = x.floor();
     f32::from_bits(((exponent as i32 + 127) as u32) << 23) * (1.0 + x - exponent)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn visibility_depends_on_the_size_of_the_image() {
+        assert_eq!([32, 64, 128, 512, 1024].map(min_aimed_px), [1, 1, 2, 24, 96]);
+        let distances_m = [128, 512].map(|px| max_visible_distance_m([1.0, 0.25, 4.0], px));
+        assert_eq!(distances_m, [20.0, 80.0]);
+    }
 }

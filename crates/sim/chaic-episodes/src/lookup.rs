@@ -32,7 +32,8 @@ pub fn episodes(
 /// `/child` or `/+tires` is a [change](chaic_core::capability::PersonChange) of the partner.
 ///
 /// # Errors
-/// [`SplitError::NoSuchEpisode`] or [`SplitError::Partner`] if no episode has this name.
+/// [`SplitError::NoSuchEpisode`], [`SplitError::Partner`] or [`SplitError::Unplayable`] if no episode has
+/// this name; another [`SplitError`] if the build is broken.
 pub fn find_episode(id: &str) -> Result<Episode, SplitError> {
     let no_such = || SplitError::NoSuchEpisode { id: id.to_owned() };
     let parts: Vec<&str> = id.split('/').collect();
@@ -41,7 +42,8 @@ pub fn find_episode(id: &str) -> Result<Episode, SplitError> {
         [task, split, number, change] => {
             let partner_error = |problem| SplitError::Partner { id: id.to_owned(), problem };
             let change = change.parse().map_err(partner_error)?;
-            return Ok(find_episode(&[task, split, number].join("/"))?.with_partner(change)?);
+            let episode = find_episode(&[task, split, number].join("/"))?;
+            return episode.with_partner(change).map_err(SplitError::Unplayable);
         }
         _ => return Err(no_such()),
     };

@@ -62,6 +62,9 @@ pub enum SplitError {
         /// Cause.
         problem: UnknownPersonChange,
     },
+    /// The changed partner cannot play the episode.
+    #[error(transparent)]
+    Unplayable(EpisodeError),
     /// This build generates an episode that differs from the one in the standard split.
     #[error(
         "{id}: this build generates an episode with digest {found}, but the standard split expects \
@@ -81,6 +84,21 @@ pub enum SplitError {
     /// A bundled episode is not readable: the build is broken.
     #[error(transparent)]
     Episode(#[from] EpisodeError),
+}
+
+impl SplitError {
+    /// Returns whether the caller's request caused the error; otherwise, the build is at fault.
+    pub fn is_usage(&self) -> bool {
+        match self {
+            SplitError::Syntax { .. }
+            | SplitError::NoSuchEpisode { .. }
+            | SplitError::Partner { .. }
+            | SplitError::Unplayable(_) => true,
+            SplitError::NotStandard { .. } | SplitError::Generate(_) | SplitError::Episode(_) => {
+                false
+            }
+        }
+    }
 }
 
 impl fmt::Display for Split {

@@ -41,6 +41,15 @@ impl InferOptions {
     /// Everything on.
     pub const ALL: InferOptions =
         InferOptions { follows_partner: true, infers_constraint: true, uses_team_planner: true };
+    /// Without following the partner.
+    pub const NO_WATCHING: InferOptions =
+        InferOptions { follows_partner: false, ..InferOptions::ALL };
+    /// Without inference of the partner's limits.
+    pub const NO_CONSTRAINT: InferOptions =
+        InferOptions { infers_constraint: false, ..InferOptions::ALL };
+    /// Without the planner for both people.
+    pub const NO_PLANNER: InferOptions =
+        InferOptions { uses_team_planner: false, ..InferOptions::ALL };
 }
 
 /// Constants of the policy, all ours; chosen on episodes of `gen-standard:7000..7010` and

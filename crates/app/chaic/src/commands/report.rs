@@ -1,10 +1,8 @@
 //! `chaic report`.
 
-use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::{Context, Result};
-use chaic_env::RunKey;
 use chaic_eval::EvalError;
 use chaic_eval::calibration::read_scores;
 use chaic_eval::losses::Losses;
@@ -12,6 +10,7 @@ use chaic_eval::metrics::{FormulaSet, RunResult, tally};
 use chaic_eval::report::{Format, Report, untraced_failures, untraced_note, write_figure};
 use chaic_eval::run::{
     ComparedRun, EpisodeJob, RunFolder, RunOptions, check_same_episodes, planned, read_results,
+    visit_planned_traces,
 };
 use chaic_eval::suite::{Robustness, SuiteFolder};
 
@@ -34,14 +33,14 @@ pub fn run(arguments: &ReportArguments, format: OutputFormat) -> Result<ExitStat
     if (arguments.from_traces || arguments.belief) && !options.traces {
         return Err(EvalError::NoTraces { path: folder.path().to_owned() }.into());
     }
-    if arguments.belief {
-        return report_beliefs(&folder, &options, format);
-    }
     // Results are useful even if the episodes of the run are gone.
     let planned = planned(&folder, &options).unwrap_or_else(|e| {
         print_warning(&format!("can't check whether the run is complete: {e}"));
         Vec::new()
     });
+    if arguments.belief {
+        return report_beliefs(&folder, &options, &planned, format);
+    }
     let results = if arguments.from_traces {
         from_traces(&folder, &planned)?
     } else {
@@ -116,8 +115,13 @@ fn report_differences(
 }
 
 /// Prints the quality of the beliefs in the traces.
-fn report_beliefs(folder: &RunFolder, options: &RunOptions, format: Format) -> Result<ExitStatus> {
-    let (scores, warnings) = read_scores(folder, options)?;
+fn report_beliefs(
+    folder: &RunFolder,
+    options: &RunOptions,
+    planned: &[EpisodeJob],
+    format: Format,
+) -> Result<ExitStatus> {
+    let (scores, warnings) = read_scores(folder, options, planned)?;
     warnings.iter().for_each(|warning| print_warning(warning));
     if scores.helpers.is_empty() {
         anyhow::bail!(
@@ -138,35 +142,14 @@ fn from_journal(folder: &RunFolder, planned: &[EpisodeJob]) -> Result<Vec<RunRes
     Ok(results)
 }
 
-/// Returns the results of the traces, and those of failed episode runs. Leaves out traces that the
-/// run does not play or that are of another episode run than their name says, with a warning.
+/// Returns the results of the traces of planned episode runs, and those of failed episode runs.
 fn from_traces(folder: &RunFolder, planned: &[EpisodeJob]) -> Result<Vec<RunResult>> {
-    let paths: BTreeSet<PathBuf> = planned.iter().map(|job| folder.trace(&job.key)).collect();
     let mut results = Vec::new();
-    for path in folder.traces()? {
-        let shown = path.display();
-        // An empty plan is unknown.
-        if !paths.is_empty() && !paths.contains(&path) {
-            print_warning(&format!(
-                "{shown}: this run doesn't play that episode run, so its trace is left out"
-            ));
-            continue;
-        }
-        let (trace, warnings) = folder.read_trace(&path)?;
-        for warning in warnings {
-            print_warning(&warning.to_string());
-        }
-        let key = trace.header.key();
-        if folder.trace(&key) != path {
-            let RunKey { helper, episode, seed, .. } = key;
-            print_warning(&format!(
-                "{shown}: it is the trace of {episode} with {helper} and seed {seed}, so it is left \
-                 out"
-            ));
-            continue;
-        }
-        results.extend(tally(&trace));
-    }
+    let warnings = visit_planned_traces(folder, planned, &mut |trace| {
+        results.extend(tally(trace));
+        Ok(())
+    })?;
+    warnings.iter().for_each(|warning| print_warning(warning));
     match read_results(&folder.results(), planned) {
         Ok((recorded, _)) => {
             if let Some(note) = untraced_note(&recorded, &results) {

@@ -93,7 +93,9 @@ fn verify_partners(arguments: &VerifyArguments, format: OutputFormat) -> Result<
 fn verify_file(path: &Path, format: OutputFormat) -> Result<ExitStatus> {
     let (trace, warnings) = trace_file::read(path)?;
     warnings.iter().for_each(|warning| print_warning(&warning.to_string()));
-    let episode = find_episode(&trace.header.episode)?;
+    // The file names the episode, not the caller.
+    let episode = find_episode(&trace.header.episode)
+        .map_err(|problem| anyhow::anyhow!("{}: {problem}", path.display()))?;
     let mismatch = verify(&trace, &episode, path)?;
     let decisions = trace.decisions().count();
     let is_damaged = |warning: &&TraceWarning| matches!(warning, TraceWarning::Torn { .. });

@@ -49,6 +49,13 @@ fn beliefs_are_explained_drawn_and_scored() {
         let report = run_ok(at, &["report", "run", "--belief", "--format", format]);
         assert!(report.contains(words), "{report}");
     }
+    // A trace that the run does not play, such as one of earlier options.
+    let trace = at.join("run/traces/no_constraint/infer/gen-0-s0.jsonl");
+    fs::copy(&trace, trace.with_file_name("gen-0-s7.jsonl")).expect("the disk has space");
+    let out = output_of(at, &["report", "run", "--belief", "--format", "csv"]);
+    assert_eq!(crate::text(&out.stdout), csv);
+    let warnings = crate::text(&out.stderr);
+    assert!(warnings.contains("gen-0-s7.jsonl: this run doesn't play"), "{warnings}");
 }
 
 #[test]

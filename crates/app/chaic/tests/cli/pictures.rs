@@ -77,6 +77,19 @@ fn a_page_to_play_and_single_traces() {
     assert!(output.status.success() && text(&output.stdout).contains("all digests agree"));
     fs::write(at.join("foreign.jsonl"), "{}\n").expect("written");
     assert!(run_err(at, &["verify", "foreign.jsonl"]).contains("foreign.jsonl"));
+    let absent = recorded.replacen("low_target/test/00", "low_target/test/99", 1);
+    fs::write(at.join("absent.jsonl"), &absent).expect("written");
+    let output = output_of(at, &["verify", "absent.jsonl"]);
+    let message = text(&output.stderr);
+    assert!(message.contains("absent.jsonl: no episode `low_target/test/99`"), "{message}");
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    let path = at.join(trace);
+    fs::write(path.with_file_name("test-99-s0.jsonl"), absent).expect("written");
+    fs::remove_file(path).expect("it exists");
+    let output = output_of(at, &["explain", "run", "low_target/test/99"]);
+    let message = text(&output.stderr);
+    assert!(message.contains("the trace was altered, so it is not explained"), "{message}");
+    assert_eq!(output.status.code(), Some(1), "{message}");
 }
 
 #[test]

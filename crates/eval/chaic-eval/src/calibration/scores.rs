@@ -11,7 +11,7 @@ use super::measures::{
 };
 use crate::error::Result;
 use crate::recorded_belief::beliefs;
-use crate::run::{RunFolder, RunOptions};
+use crate::run::{EpisodeJob, RunFolder, RunOptions, visit_planned_traces};
 
 /// Quality of the beliefs of all helpers that record one.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -114,23 +114,23 @@ impl HypothesisScore {
     }
 }
 
-/// Computes the scores of the whole traces of a run. Also returns warnings about traces that are
-/// damaged or have no end.
+/// Computes the scores of the whole traces of planned episode runs; an empty plan is unknown. Also returns
+/// warnings about traces that are damaged or left out.
 ///
 /// # Errors
 /// If a trace or the episode of a trace with a belief can't be read.
 pub fn read_scores(
     folder: &RunFolder,
     options: &RunOptions,
+    planned: &[EpisodeJob],
 ) -> Result<(BeliefScores, Vec<String>)> {
-    let (mut episodes, mut warnings) = (Vec::new(), Vec::new());
-    for path in folder.traces()? {
-        let (trace, found) = folder.read_trace(&path)?;
-        warnings.extend(found.iter().map(ToString::to_string));
-        if beliefs(&trace).next().is_some() {
+    let mut episodes = Vec::new();
+    let warnings = visit_planned_traces(folder, planned, &mut |trace| {
+        if beliefs(trace).next().is_some() {
             let episode = folder.episode(options, &trace.header.key())?;
-            episodes.extend(EpisodeBelief::new(&trace, &episode.setup().goal));
+            episodes.extend(EpisodeBelief::new(trace, &episode.setup().goal));
         }
-    }
+        Ok(())
+    })?;
     Ok((BeliefScores::new(&episodes), warnings))
 }

@@ -41,6 +41,7 @@ fn losses_of(results: &[RunResult], helpers: &[&str]) -> Result<Losses, String> 
         perception: Default::default(),
         isolation: Default::default(),
         weights: Default::default(),
+        limits_s: Default::default(),
     };
     let environments = Environments::default();
     let played = PlayedEpisodes { results, planned: &[], environments: &environments };

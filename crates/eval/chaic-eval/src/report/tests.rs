@@ -67,6 +67,7 @@ fn granted(partner: Grants) -> RunGrants {
         perception: Default::default(),
         isolation: Default::default(),
         weights: Default::default(),
+        limits_s: Default::default(),
     }
 }
 

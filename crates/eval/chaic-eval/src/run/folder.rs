@@ -248,9 +248,14 @@ impl RunFolder {
     /// Checks that the helpers of a resumed run are granted what `run.json` records.
     pub(crate) fn check_grants(&self, granted: &RunGrants) -> Result<()> {
         let path = self.path.join("run.json");
-        let Some(recorded) = self.granted()?.filter(|recorded| recorded != granted) else {
+        let Some(mut recorded) = self.granted()? else { return Ok(()) };
+        if recorded.limits_s.is_empty() {
+            // An earlier build started the run.
+            recorded.limits_s.clone_from(&granted.limits_s);
+        }
+        if recorded == *granted {
             return Ok(());
-        };
+        }
         for (name, isolation) in &recorded.isolation {
             let other = granted.isolation.get(name).filter(|other| *other != isolation);
             if let Some(other) = other {
@@ -278,6 +283,15 @@ impl RunFolder {
                 "{} was started with other weights for `{name}`; give the same ones or start a new run",
                 path.display()
             )));
+        }
+        for (name, limit_s) in &recorded.limits_s {
+            let other = granted.limits_s.get(name).filter(|other| *other != limit_s);
+            if let Some(other) = other {
+                return Err(EvalError::Options(format!(
+                    "limit_s of {name} is {other} now, but {} has {limit_s}; omit it, or start a new run",
+                    path.display()
+                )));
+            }
         }
         Err(EvalError::Options(format!(
             "the grants of helpers or partner differ from {}; start a new run",

@@ -28,6 +28,9 @@ pub struct RunGrants {
     /// Digests of weights by helper, for helpers with trained weights.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub weights: BTreeMap<String, String>,
+    /// Time limits of one action by helper, seconds as text, for helpers in Python.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub limits_s: BTreeMap<String, String>,
 }
 
 /// Images that helpers request before their first briefing, by name; without helpers that request none.
@@ -42,6 +45,7 @@ impl RunGrants {
         let rules = options.rules()?.planner;
         let (mut grants, mut perception) = (BTreeMap::new(), BTreeMap::new());
         let (mut isolation, mut weights) = (BTreeMap::new(), BTreeMap::new());
+        let mut limits_s = BTreeMap::new();
         for name in &options.helpers {
             let helper = helper_registry::find(helpers, name, rules)?;
             let Some(helper) = helper else { continue };
@@ -49,11 +53,14 @@ impl RunGrants {
             perception.extend(helper.agent.perception().map(|text| (name.clone(), text)));
             isolation.extend(helper.agent.isolation().map(|text| (name.clone(), text)));
             weights.extend(helper.agent.weights().map(|digest| (name.clone(), digest)));
+            limits_s
+                .extend(helpers.limit_s(name).map(|limit_s| (name.clone(), limit_s.to_string())));
         }
         let partner =
             helper_registry::find_partner(helpers, options.partner.as_deref(), None, rules)?;
         let partner = partner.map_or_else(|| partner_grants(rules), |p| p.grants);
-        let granted = RunGrants { helpers: grants, partner, perception, isolation, weights };
+        let granted =
+            RunGrants { helpers: grants, partner, perception, isolation, weights, limits_s };
         granted.check_track(options)?;
         Ok(granted)
     }

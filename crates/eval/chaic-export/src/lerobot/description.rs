@@ -3,7 +3,9 @@
 use chaic_env::trace::Header;
 
 use super::{ACTION, EpisodeEntry, KINDS, LeRobotWriter, STATE};
-use crate::card::{DataType, DatasetDescription, Field, FileGroup, Place, RecordSet, common};
+use crate::card::{
+    DataType, DatasetDescription, Field, FileGroup, LICENSE, Place, RecordSet, common,
+};
 
 /// Source of the decisions of an episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,6 +77,11 @@ impl Sources {
         statements.join(" ")
     }
 
+    /// Returns the license; `None` if real people decide, or may have decided in a recording.
+    fn license(&self) -> Option<&'static str> {
+        (self.real + self.recorded == 0).then_some(LICENSE)
+    }
+
     fn biases(&self) -> Vec<&'static str> {
         let mut biases = Vec::new();
         if self.real > 0 {
@@ -127,6 +134,7 @@ impl LeRobotWriter {
             ],
             biases: sources.biases(),
             personal_information: sources.personal_information(),
+            license: sources.license(),
             tags: &["LeRobot", "chaic", "embodied-ai", "human-ai-cooperation", "simulation"],
             files: file_groups(),
             records: RecordSet {

@@ -39,11 +39,27 @@ pub enum StoreError {
         /// Cause.
         problem: String,
     },
-    /// The folder holds clips of another configuration or version.
+    /// The folder holds clips of another split, perception or version.
     #[error(
         "{0} has clips of another configuration or version; choose another folder, or remove it"
     )]
     Config(PathBuf),
+    /// The folder holds clips of another configuration.
+    #[error(
+        "{path} has clips of another configuration: `{key}` is {requested}, but was {recorded} when they were \
+         collected; choose another folder, or remove it",
+        path = path.display()
+    )]
+    Setting {
+        /// The folder.
+        path: PathBuf,
+        /// Key whose value differs.
+        key: String,
+        /// Value with which the clips were collected.
+        recorded: String,
+        /// Requested value.
+        requested: String,
+    },
     /// There are no clips to train on.
     #[error("the episodes gave no clips to train on; set collect.episodes to a larger number")]
     Empty,
@@ -52,7 +68,7 @@ pub enum StoreError {
 impl StoreError {
     /// Returns whether the caller's request caused the error.
     pub fn is_usage(&self) -> bool {
-        matches!(self, StoreError::Config(_))
+        matches!(self, StoreError::Config(_) | StoreError::Setting { .. })
     }
 }
 
@@ -84,15 +100,24 @@ impl ClipFolder {
             return Ok(ClipFolder(folder.to_owned()));
         }
         let found = parse_config(&read_bounded(&path, MAX_BYTES)?);
-        let is_same = found.is_some_and(|(found_split, found_perception, found_config)| {
+        let same_source = found.filter(|(found_split, found_perception, _)| {
             found_split.as_str() == Some(&*split.to_string())
                 && found_perception.as_str() == Some(&*perception)
-                && found_config == *config
         });
-        match is_same {
-            true => Ok(ClipFolder(folder.to_owned())),
-            false => Err(StoreError::Config(folder.to_owned())),
-        }
+        let Some((_, _, found_config)) = same_source else {
+            return Err(StoreError::Config(folder.to_owned()));
+        };
+        let (recorded, requested) = (values(&found_config), values(config));
+        let changed = requested.iter().find_map(|(key, value)| {
+            let before = recorded.get(key).filter(|before| *before != value)?;
+            Some(StoreError::Setting {
+                path: folder.to_owned(),
+                key: key.clone(),
+                recorded: before.to_string(),
+                requested: value.to_string(),
+            })
+        });
+        changed.map_or_else(|| Ok(ClipFolder(folder.to_owned())), Err)
     }
 
     fn path(&self, first_episode: usize) -> PathBuf {
@@ -121,6 +146,12 @@ impl ClipFolder {
     pub fn write(&self, first_episode: usize, clips: &[Clip]) -> Result<(), StoreError> {
         Ok(write_atomically(&self.path(first_episode), &to_bytes(clips))?)
     }
+}
+
+/// Returns the values of a configuration as its file has them; each configuration has all keys.
+fn values(config: &ClipCollectionConfig) -> toml::Table {
+    let text = toml::to_string(config).expect("the configuration has string keys only");
+    text.parse().expect("serialized TOML can be parsed")
 }
 
 /// Parses a configuration file into split, perception and configuration; `None` if it is not one of
@@ -315,5 +346,17 @@ mod tests {
             let error = folder.read(0).unwrap_err().to_string();
             assert!(error.contains("holds no clips"), "{error}");
         }
+    }
+
+    #[test]
+    fn a_changed_setting_is_named_with_both_values() {
+        let dir = tempfile::tempdir().unwrap();
+        let config = ClipCollectionConfig::default();
+        open(dir.path(), DatasetSplit::Train, &config).unwrap();
+        let other_config = ClipCollectionConfig { varied_fraction: 0.5, ..config };
+        let refused = open(dir.path(), DatasetSplit::Train, &other_config).unwrap_err();
+        let expected =
+            "configuration: `varied_fraction` is 0.5, but was 0.35 when they were collected";
+        assert!(refused.is_usage() && refused.to_string().contains(expected), "{refused}");
     }
 }

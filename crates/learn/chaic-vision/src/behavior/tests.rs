@@ -276,6 +276,23 @@ fn clips_that_cannot_be_stored_are_a_failed_file_operation() {
 }
 
 #[test]
+fn a_training_names_the_changed_key_of_its_clips() {
+    let dir = tempfile::tempdir().unwrap();
+    let stopped = AtomicBool::new(true);
+    let new = |episodes| {
+        let collect = ClipCollectionConfig { episodes, ..ClipCollectionConfig::default() };
+        let config = BehaviorTrainingConfig { collect, ..BehaviorTrainingConfig::default() };
+        BehaviorTrainer::new(&config, dir.path(), &mut |_| (), &stopped)
+    };
+    assert!(new(700).unwrap().is_none());
+    let refused = new(8).err().unwrap();
+    let expected =
+        "`collect.episodes` is 8, but was 700 when the clips were collected; set it back";
+    assert!(refused.is_usage() && refused.to_string().contains(expected), "{refused}");
+    assert!(new(700).unwrap().is_none());
+}
+
+#[test]
 fn a_training_that_has_diverged_has_no_finite_loss() {
     let config =
         BehaviorTrainingConfig { steps: 40, batch_size: 1, ..BehaviorTrainingConfig::default() };

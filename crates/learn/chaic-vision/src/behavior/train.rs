@@ -198,6 +198,24 @@ impl From<StoreError> for TrainingError {
     }
 }
 
+/// Checks that clips in the folder of a training are those of its configuration. A training that was stopped
+/// before its first checkpoint has no other record of it.
+fn check_clips(config: &BehaviorTrainingConfig, folder: &Path) -> Result<(), TrainingError> {
+    // Only the clips for training have the numbers of the configuration.
+    let (path, split) = (folder.join("clips/train"), DatasetSplit::Train);
+    match ClipFolder::open(&path, split, &config.collect, &GroundTruthPerceptionFactory) {
+        Ok(_) => Ok(()),
+        Err(StoreError::Setting { key, recorded, requested, .. }) => Err(TrainingError::Config {
+            path: folder.join(chaic_training::CONFIG),
+            problem: format!(
+                "`collect.{key}` is {requested}, but was {recorded} when the clips were collected; set it back, or \
+                 start another training with --out"
+            ),
+        }),
+        Err(error) => Err(error.into()),
+    }
+}
+
 impl Trainer for BehaviorTrainer {
     type Config = BehaviorTrainingConfig;
     const KIND: &'static str = "behavior";
@@ -222,6 +240,7 @@ impl Trainer for BehaviorTrainer {
         progress: &mut dyn FnMut(&str),
         stop: &AtomicBool,
     ) -> Result<Option<BehaviorTrainer>, TrainingError> {
+        check_clips(config, folder)?;
         let mut clips = |split: DatasetSplit| {
             let ClipCollectionConfig { max_per_class, episodes, .. } = config.collect;
             let (max_per_class, episodes) = match split {
@@ -260,6 +279,11 @@ impl Trainer for BehaviorTrainer {
 
     fn read_weights(_: &BehaviorTrainingConfig, weights: &[u8]) -> Result<Vec<f32>, WeightsError> {
         Ok(TrainedBehavior::from_bytes(weights)?.parameters)
+    }
+
+    fn fixed_keys() -> Vec<&'static str> {
+        // The clips in the folder depend on them.
+        vec!["collect"]
     }
 
     fn network(&self) -> &Network {

@@ -145,6 +145,8 @@ fn episodes_are_found_by_name() {
     {
         assert!(matches!(find_episode(id), Err(SplitError::NoSuchEpisode { .. })), "{id}");
     }
+    let without_bicycle = find_episode("obstacle/test/07/rider").expect_err("it has no bicycle");
+    assert!(matches!(without_bicycle, SplitError::Unplayable(_)), "{without_bicycle}");
     assert_eq!(
         find_episode("obstacle/test/07/child").expect("it exists").id(),
         "obstacle/test/07/child"

@@ -181,7 +181,7 @@ fn without_evidence_it_follows_a_visible_partner_and_explores_otherwise() {
         assert_eq!(plans[17..], [then, then], "after 18 turns");
     }
     assert_eq!(episode.policy.identified, None);
-    let options = InferOptions { follows_partner: false, ..InferOptions::ALL };
+    let options = InferOptions::NO_WATCHING;
     let mut episode = Episode::ready(options, house);
     assert_eq!(episode.step(10, &with_partner), Plan::Explore, "it never watches");
 }
@@ -346,7 +346,7 @@ fn only_high_goal_places_are_used_while_the_partner_may_be_a_child() {
     let mut told = Episode::ready(InferOptions::ALL, apples);
     told.step(0, &[bed()]);
     assert_eq!(low(&told), None, "the briefing says it");
-    let options = InferOptions { infers_constraint: false, ..InferOptions::ALL };
+    let options = InferOptions::NO_CONSTRAINT;
     let mut adult = Episode::ready(options, house);
     adult.step(0, &[bed()]);
     assert_eq!(low(&adult), None);
@@ -371,9 +371,7 @@ fn an_empty_list_of_targets_leads_to_exploration() {
 
 #[test]
 fn contradictory_takes_still_lead_to_valid_plans() {
-    for options in
-        [InferOptions::ALL, InferOptions { uses_team_planner: false, ..InferOptions::ALL }]
-    {
+    for options in [InferOptions::ALL, InferOptions::NO_PLANNER] {
         let mut episode = Episode::ready(options, house);
         let all = [bed(), apple(), banana(), seen_partner(1.0, -2.0)];
         let classes = episode.briefing.possible_targets.clone();

@@ -43,6 +43,9 @@ pub fn new_navigator(walking: Walking) -> Box<dyn Navigator> {
     }
 }
 
+/// Number of sides from which a small object is looked for in one plan.
+const MAX_SIDES_VIEWED: u32 = 2;
+
 /// Result of one execution step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress {
@@ -246,6 +249,28 @@ impl Executor {
             }
             _ => {}
         }
+    }
+
+    /// Records that no image from here shows an object on which the plan acts. Returns whether
+    /// another side may show it: a wall may hide a large object, the back of a chair a small one.
+    /// A small object above the eyes is hidden from all sides, by the edge of what it lies on.
+    pub fn record_unseen(&mut self, memory: &Memory, track: TrackId) -> bool {
+        let Some(object) = memory.objects.get(track) else { return false };
+        let eyes_above_m = memory.eyes_above_m(object);
+        let is_high = eyes_above_m.is_some_and(|m| m <= 0.0);
+        let Some(interaction) = self.interaction.as_mut().filter(|_| !is_high) else {
+            return false;
+        };
+        let max_sides = match eyes_above_m {
+            Some(_) => MAX_SIDES_VIEWED,
+            None => memory.rules.failures.max_positions_tried,
+        };
+        let here = memory.position();
+        self.failed_positions.push((track, here, memory.frame));
+        interaction.record_failed_position(here);
+        self.navigator.reset();
+        self.has_acted = false;
+        interaction.n_failed() < max_sides
     }
 
     /// Returns the outcome of the plan's interaction, if it was the last action.

@@ -107,6 +107,10 @@ pub struct Memory {
     is_partner: bool,
     gait: Gait,
     removes_obstacles: bool,
+    /// Height of the eyes, meters.
+    eye_m: f32,
+    /// True if actions point at objects, which must be in the image.
+    pub needs_view: bool,
     /// True if `dijkstra` starts, or has started, with the current costs and position.
     has_path_costs: bool,
     dijkstra: RefCell<DijkstraSearch>,
@@ -154,6 +158,8 @@ impl Memory {
             is_partner: briefing.me == AgentId::PARTNER,
             gait: briefing.capability.gait,
             removes_obstacles: briefing.capability.removes_obstacles,
+            eye_m: briefing.capability.eye_height_m,
+            needs_view: false,
             has_path_costs: false,
             dijkstra: RefCell::default(),
         }
@@ -178,6 +184,7 @@ impl Memory {
             self.people.iter().filter(|p| p.is_in_view).map(|p| p.position_in_world).collect();
         let people_at = if self.rules.sees_held_objects { &in_view[..] } else { &[] };
         self.objects.update(detections, people_at, self.rules.seen_held_ignore_frames, self.frame);
+        self.objects.withdraw(&percepts.withdrawn, &briefing.possible_targets);
         if self.rules.forgets_missing && !percepts.is_reused {
             self.objects.forget_missing(observation);
         }
@@ -338,6 +345,13 @@ impl Memory {
     /// (facts A1.6).
     pub fn waits_for_obstacles(&self) -> bool {
         !self.removes_obstacles
+    }
+
+    /// Returns the height of the eyes above a small object that must be in the image for an action,
+    /// meters; `None` if it need not be.
+    pub fn eyes_above_m(&self, object: &MappedObject) -> Option<f32> {
+        let needs_view = self.needs_view && object.class.info().is_carriable();
+        needs_view.then_some(self.eye_m - object.position_in_world.y)
     }
 
     /// Returns whether the agent navigates to the goal place's position at the start of the plan,

@@ -8,7 +8,7 @@ use chaic_core::{AgentId, Briefing, ClassId, EntityId, Observation, Outcome, Tar
 use crate::track::{Carried, Hands, Intent, TrackId};
 
 pub(crate) use segments::Rays;
-pub use segments::{MIN_PIXELS, PixelKind, STRIDE, SegmentMeasurement, Segments};
+pub use segments::{MIN_PIXELS, OBJECT_RANGE_M, PixelKind, STRIDE, SegmentMeasurement, Segments};
 
 /// Object detected in an image.
 #[derive(Clone, Debug, PartialEq)]
@@ -76,6 +76,8 @@ pub struct Percepts {
     /// True if the image was not searched for objects, and the detections are those of an earlier
     /// image. A missing detection then means nothing.
     pub is_reused: bool,
+    /// Tracks of earlier detections that perception no longer believes in: they rather do not exist.
+    pub withdrawn: Vec<TrackId>,
 }
 
 /// Turns images into detections.
@@ -218,7 +220,7 @@ impl Perception for GroundTruthIds {
             Some(Detection::new(entity.into(), class, entity.agent(), measurement?))
         };
         let detections = measurements.into_iter().enumerate().filter_map(detection).collect();
-        Percepts { detections, dynamic_mask, stride: STRIDE, hands, is_reused: false }
+        Percepts { detections, dynamic_mask, stride: STRIDE, hands, ..Percepts::default() }
     }
 
     fn target(&self, track: TrackId) -> Option<Target> {

@@ -251,11 +251,21 @@ impl Episode {
             Some(turn) => resolve_target(turn, target).map(|action| (turn, action)),
             None => {
                 self.search = None;
-                let until = self.memory.frame + self.memory.rules.failures.ignore_frames;
-                self.memory.objects.ignore(track, until);
                 None
             }
         }
+    }
+
+    /// Handles an intent whose object no image from here shows. Returns whether the plan goes on
+    /// from another side; otherwise the object is ignored for a while.
+    fn views_from_elsewhere(&mut self, intent: Intent) -> bool {
+        let Some(track) = intent.subject() else { return false };
+        let goes_on = self.executor.record_unseen(&self.memory, track);
+        if !goes_on {
+            let until = self.memory.frame + self.memory.rules.failures.ignore_frames;
+            self.memory.objects.ignore(track, until);
+        }
+        goes_on
     }
 
     /// Asks the policy for a plan; `None` if the current plan stays.
@@ -356,6 +366,7 @@ impl<P: Policy> PlanningAgent<P> {
             match episode.step(&plan) {
                 Progress::Act(intent) => match episode.resolve(intent, self.perception.as_ref()) {
                     Some(resolved) => return Ok(Some(resolved)),
+                    None if episode.views_from_elsewhere(intent) => {}
                     None => episode.plan = None,
                 },
                 Progress::Done | Progress::Failed => episode.plan = None,
@@ -390,7 +401,9 @@ impl<P: Policy> Agent for PlanningAgent<P> {
         self.policy.reset(briefing);
         self.behavior.reset();
         self.perception.reset(briefing);
-        self.episode = Some(Episode::new(briefing, self.rules));
+        let mut episode = Episode::new(briefing, self.rules);
+        episode.memory.needs_view = self.perception.uses_pixel_targets();
+        self.episode = Some(episode);
     }
 
     fn act(&mut self, observation: &Observation) -> Result<Action, AgentError> {

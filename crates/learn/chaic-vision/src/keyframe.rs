@@ -73,8 +73,8 @@ impl Keyframe {
             detections: self.detections.iter().filter_map(visible).collect(),
             dynamic_mask: vec![true; n_samples as usize],
             stride: STRIDE,
-            hands: None,
             is_reused: true,
+            ..Percepts::default()
         }
     }
 }

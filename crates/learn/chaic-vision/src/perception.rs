@@ -188,7 +188,8 @@ impl Tracking {
         self.tracker.mask_movables(depth_m, camera, STRIDE, &mut dynamic_mask);
         self.last = detections.iter().map(|d| (d.track, d.pixel)).collect();
         self.last.extend(self.tracker.missed(frame, depth_m, camera));
-        Percepts { detections, dynamic_mask, stride: STRIDE, ..Percepts::default() }
+        let withdrawn = self.tracker.withdraw();
+        Percepts { detections, dynamic_mask, stride: STRIDE, withdrawn, ..Percepts::default() }
     }
 
     /// Finds the pixels of the tracks in an image whose detections are those of a keyframe.

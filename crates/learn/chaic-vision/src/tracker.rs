@@ -5,7 +5,9 @@
 //! knows its own held objects from proprioception: they are no detections.
 
 mod masks;
+mod missing;
 mod plan_extent;
+mod track;
 
 use std::cell::OnceCell;
 use std::collections::BTreeMap;
@@ -18,16 +20,16 @@ use chaic_core::{Action, AgentId, Briefing, ClassId, EntityId, Frame, Outcome, V
 
 use self::masks::is_within;
 use self::plan_extent::PlanExtent;
-use crate::labels::{class_of, n_labels};
-use crate::loss::{exp, ln, sigmoid};
+use crate::labels::class_of;
 
 // These constants were chosen by reasoning, not by measurement.
-/// Probability of each label that a detection does not name.
-const UNNAMED: f32 = 0.001;
 /// A detection whose label agrees with that of a track with a lower probability has another label.
 const MIN_AGREEMENT: f32 = 0.02;
 /// Cost of a match between labels that certainly differ, relative to the maximum displacement.
 const DISAGREEMENT_COST: f32 = 0.5;
+/// Objects are at most this much larger than their class: the shelves of shops have 1.47 times its
+/// diagonal. Larger extents include neighbors.
+const MAX_SCALE: f32 = 1.5;
 
 /// Thresholds of the tracker. Lengths in meters.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -134,7 +136,7 @@ impl Measurement {
 /// Detected object in the association of one image.
 struct DetectedObject<'a> {
     measurement: &'a Measurement,
-    /// True if it is within the reach of a visible person.
+    /// True if it may be in the hands of a visible person.
     in_hand: bool,
     plan_extent: OnceCell<Option<PlanExtent>>,
 }
@@ -152,9 +154,6 @@ impl DetectedObject<'_> {
         is_large.then(|| self.plan_extent()).flatten()
     }
 }
-
-/// Depths differ by at least this much between the points of an object, meters.
-const MIN_DEPTH_ERROR_M: f32 = 0.05;
 
 /// Returns the pixel of a point, the depth of the point and the depth in the image, meters; `None`
 /// outside the image.
@@ -187,8 +186,12 @@ struct Track {
     /// Its highest point seen since it moved last, meters.
     top_m: f32,
     last_seen: Frame,
+    /// Frame in which a mask too large for one object last contained it.
+    last_covered: Frame,
     /// Log odds that the object exists.
     log_odds: f32,
+    /// True if it was reported and has not been withdrawn since.
+    is_reported: bool,
     /// True if another agent held it when it was last seen.
     is_carried: bool,
     /// True if the agent released it and has not seen it since.
@@ -207,6 +210,11 @@ pub struct Tracker {
     held: Vec<TrackId>,
     /// Obstacle that the agent has just removed.
     removed_obstacle: Option<TrackId>,
+    /// Camera and frame of the last image.
+    last_image: Option<(Camera, Frame)>,
+    /// Frame of the image before the present one, if both have the same view. What a view shows or
+    /// lacks a second time is no new evidence: the detector repeats its errors.
+    repeated: Option<Frame>,
 }
 
 impl Tracker {
@@ -237,6 +245,8 @@ impl Tracker {
         camera: &Camera,
     ) -> (Vec<Detection>, Vec<PixelKind>) {
         self.release(now, pose);
+        let last_image = self.last_image.replace((*camera, now));
+        self.repeated = last_image.filter(|(last, _)| last == camera).map(|(_, frame)| frame);
         let mut kinds: Vec<PixelKind> =
             measurements.iter().map(|s| pixel_kind(s.label())).collect();
         let held_boxes = self.held_boxes(Vec3::ZERO);
@@ -256,45 +266,6 @@ impl Tracker {
         self.penalize_missing(now, depth_m, camera);
         detections.sort_by_key(|d| d.track);
         (detections, kinds)
-    }
-
-    /// Returns one pixel of each track that was missed in this image although the depth at its place
-    /// is that of the object. The pixel targets it like a detection.
-    pub fn missed(&self, now: Frame, depth_m: &[f32], camera: &Camera) -> Vec<(TrackId, [u32; 2])> {
-        let is_missed = |t: &&Track| {
-            t.last_seen < now && !t.is_carried && !t.is_released && !self.held.contains(&t.id)
-        };
-        let pixel = |track: &Track| {
-            let (pixel, depth, visible_m) = depths_at(track.position, depth_m, camera)?;
-            let thickness_m = extents_m(track.label).into_iter().fold(f32::MAX, f32::min);
-            let is_there = (visible_m - depth).abs() <= (0.5 * thickness_m).max(MIN_DEPTH_ERROR_M);
-            is_there.then_some((track.id, pixel))
-        };
-        self.tracks.iter().filter(is_missed).filter_map(pixel).collect()
-    }
-
-    /// Lowers the log odds of tracks whose unoccluded place does not show them.
-    fn penalize_missing(&mut self, now: Frame, depth_m: &[f32], camera: &Camera) {
-        /// Objects nearer by more than this occlude the place, meters.
-        const OCCLUSION_MARGIN_M: f32 = 0.1;
-        /// Objects with fewer expected pixels may be missed by the detector.
-        const MIN_EXPECTED_PX: f32 = 100.0;
-        let focal_px = camera.focal_px();
-        let (min_log_odds, decrease) = (self.config.log_odds_range[0], self.config.miss_log_odds);
-        for track in self.tracks.iter_mut().filter(|t| t.last_seen < now) {
-            if self.held.contains(&track.id) {
-                continue;
-            }
-            let Some((_, depth, visible_depth)) = depths_at(track.position, depth_m, camera) else {
-                continue;
-            };
-            let mut extents = extents_m(track.label);
-            extents.sort_by(f32::total_cmp);
-            let expected_px = extents[0] * extents[1] * (focal_px / depth) * (focal_px / depth);
-            if visible_depth > depth - OCCLUSION_MARGIN_M && expected_px > MIN_EXPECTED_PX {
-                track.log_odds = (track.log_odds - decrease).max(min_log_odds);
-            }
-        }
     }
 
     /// Updates the tracks of objects that left the agent's hands.
@@ -367,7 +338,7 @@ impl Tracker {
     ) -> Vec<Detection> {
         let object = |k: &usize| {
             let measurement = &measurements[*k];
-            let in_hand = self.is_near_person(&measurement.extent, now);
+            let in_hand = self.may_be_in_hand(measurement, now);
             DetectedObject { measurement, in_hand, plan_extent: OnceCell::new() }
         };
         let objects: Vec<DetectedObject> = objects.iter().map(object).collect();
@@ -390,29 +361,67 @@ impl Tracker {
                 track_of.insert(k, t);
             }
         }
+        let covers: Vec<bool> = objects.iter().map(|object| self.cover(object, now)).collect();
+        // Matched detections first: fragments are those of the objects that this image shows.
+        let (matched, unmatched): (Vec<usize>, Vec<usize>) =
+            (0..objects.len()).partition(|k| track_of.contains_key(k));
         let mut found = Vec::new();
-        for (k, object) in objects.iter().enumerate() {
+        for k in matched.into_iter().chain(unmatched) {
+            let object = &objects[k];
             let measurement = object.measurement;
             let t = match track_of.get(&k) {
                 Some(t) => *t,
-                None if self.is_fragment(object, now) => continue,
-                None => self.start_track(measurement, now),
+                None if covers[k] || self.is_fragment(object, now) => continue,
+                None => self.start_track(object, now),
             };
-            let (config, track) = (self.config, &mut self.tracks[t]);
-            track.update(object, now, &config);
+            let (config, repeated) = (self.config, self.repeated);
+            let track = &mut self.tracks[t];
+            let is_repeated = repeated == Some(track.last_seen) && !track.is_released;
+            if !is_repeated {
+                track.add_evidence(measurement, &config);
+            }
+            let is_part = track.is_part_of(object, &config);
+            if is_part {
+                track.last_seen = now;
+            } else {
+                track.locate(object, now, &config);
+            }
             let is_reported = track.log_odds > config.report_log_odds;
             if let Some(class) = class_of(track.label).filter(|_| is_reported) {
-                let detection = Detection::new(track.id, class, None, measurement.extent.clone());
+                track.is_reported = true;
+                let extent = &measurement.extent;
+                let extent = if is_part { track.part_of(extent) } else { extent.clone() };
+                let detection = Detection::new(track.id, class, None, extent);
                 found.push(Detection { confidence: track.confidence(), ..detection });
             }
         }
         found
     }
 
-    /// True if an object is within the reach of a visible person.
-    fn is_near_person(&self, extent: &SegmentMeasurement, now: Frame) -> bool {
+    /// True if an object is within the reach of a visible person, and not fixed.
+    fn may_be_in_hand(&self, measurement: &Measurement, now: Frame) -> bool {
+        let extent = &measurement.extent;
         let near = |at: &Vec3| horizontal_distance(*at, extent.position_in_world) < 1.0;
-        extent.bottom_m > 0.3 && self.people.values().any(|(at, frame)| *frame == now && near(at))
+        pixel_kind(measurement.label()) != PixelKind::Fixed
+            && extent.bottom_m > 0.3
+            && self.people.values().any(|(at, frame)| *frame == now && near(at))
+    }
+
+    /// Marks the tracks within a mask of their label that is too large for one object. The mask tells
+    /// neither that they are missing nor that there is another object. Returns whether there is one.
+    fn cover(&mut self, object: &DetectedObject<'_>, now: Frame) -> bool {
+        let (config, label) = (self.config, object.measurement.label());
+        let seen = object.large_extent(label).filter(|seen| config.is_oversized(label, seen));
+        let Some(seen) = seen else { return false };
+        let mut covers = false;
+        for track in self.tracks.iter_mut().filter(|t| t.label == label && t.is_at_rest()) {
+            let is_inside = |extent: PlanExtent| seen.contains(extent.center(), 0.0);
+            if !self.held.contains(&track.id) && track.extent.is_some_and(is_inside) {
+                track.last_covered = now;
+                covers = true;
+            }
+        }
+        covers
     }
 
     /// Cost of a match between a detection and a track; `None` if it is impossible.
@@ -476,14 +485,17 @@ impl Tracker {
         let near_m = self.config.fragment_extents * size_m;
         let at = measurement.extent.position_in_world;
         let seen = object.large_extent(label);
-        let mut same = self.tracks.iter().filter(|t| t.last_seen == now && t.label == label);
-        same.any(|track| match track.extent.as_ref().zip(seen.as_ref()) {
-            Some((extent, seen)) => self.config.is_one_object(label, extent, seen),
-            None => track.position.distance(at) < near_m,
+        let is_same = |t: &&Track| t.last_seen == now && !t.is_released && t.label == label;
+        self.tracks.iter().filter(is_same).any(|track| {
+            match track.extent.as_ref().zip(seen.as_ref()) {
+                Some((extent, seen)) => self.config.is_one_object(label, extent, seen),
+                None => track.position.distance(at) < near_m,
+            }
         })
     }
 
-    fn start_track(&mut self, measurement: &Measurement, now: Frame) -> usize {
+    fn start_track(&mut self, object: &DetectedObject<'_>, now: Frame) -> usize {
+        let measurement = object.measurement;
         self.tracks.push(Track {
             id: TrackId(TrackId::FIRST_OWN.0 + self.tracks.len() as u32),
             evidence: BTreeMap::new(),
@@ -492,72 +504,22 @@ impl Tracker {
             extent: None,
             top_m: 0.0,
             last_seen: now,
+            last_covered: now,
             log_odds: 0.0,
-            is_carried: false,
+            is_reported: false,
+            is_carried: object.in_hand,
             is_released: false,
         });
         self.tracks.len() - 1
     }
 }
 
-impl Track {
-    /// Probability of a label, given that the object exists.
-    fn probability(&self, label: u8) -> f32 {
-        let evidence = self.evidence.get(&label).copied().unwrap_or(0.0);
-        let max = self.evidence.values().copied().fold(0.0, f32::max);
-        let n_other = (n_labels() - 1).saturating_sub(self.evidence.len()) as f32;
-        let sum: f32 = self.evidence.values().map(|evidence| exp(evidence - max)).sum();
-        exp(evidence - max) / (sum + n_other * exp(-max))
-    }
-
-    /// Probability that track and detection have the same label.
-    fn agreement(&self, measurement: &Measurement) -> f32 {
-        let shared =
-            |(label, _): &(u8, f32)| self.probability(*label) * measurement.probability(*label);
-        measurement.names.iter().map(shared).sum()
-    }
-
-    /// Probability that the object exists and has its label.
-    fn confidence(&self) -> f32 {
-        sigmoid(self.log_odds) * self.probability(self.label)
-    }
-
-    fn update(&mut self, object: &DetectedObject<'_>, now: Frame, config: &TrackerConfig) {
-        let DetectedObject { measurement, in_hand: is_carried, .. } = *object;
-        let [low, high] = config.log_odds_range;
-        let score = measurement.score();
-        self.log_odds = match self.evidence.is_empty() {
-            true => config.birth_log_odds * (score - config.birth_score),
-            false => self.log_odds + config.hit_log_odds * score,
-        };
-        self.log_odds = self.log_odds.clamp(low, high);
-        self.evidence.values_mut().for_each(|evidence| *evidence *= config.evidence_decay);
-        for (label, _) in &measurement.names {
-            let ratio = measurement.probability(*label).max(UNNAMED) / UNNAMED;
-            *self.evidence.entry(*label).or_default() += score * ln(ratio);
-        }
-        let strongest = self.evidence.iter().fold((0.0, self.label), |best, (label, evidence)| {
-            if *evidence > best.0 { (*evidence, *label) } else { best }
-        });
-        self.label = strongest.1;
-        self.position = measurement.extent.position_in_world;
-        let seen = object.large_extent(self.label);
-        let has_moved = self.is_carried || self.is_released || is_carried;
-        let top_m = measurement.extent.top_m;
-        self.top_m = if has_moved { top_m } else { self.top_m.max(top_m) };
-        self.extent = match (&self.extent, seen) {
-            (Some(extent), Some(seen)) if !has_moved => {
-                // A mask that overlaps a neighbor does not enlarge the object.
-                let fits = config.fits_object(self.label, extent, &seen);
-                Some(if fits { extent.union(&seen) } else { *extent })
-            }
-            (_, seen) => seen,
-        };
-        (self.last_seen, self.is_carried, self.is_released) = (now, is_carried, false);
-    }
-}
-
 impl TrackerConfig {
+    /// Returns whether an extent is too large for one object.
+    fn is_oversized(&self, label: u8, extent: &PlanExtent) -> bool {
+        extent.diameter_m() > MAX_SCALE * diagonal_m(label) + self.diameter_tolerance_m
+    }
+
     /// Returns whether two extents can belong to one object: their union is not larger than an
     /// object, or their centers are near.
     fn is_one_object(&self, label: u8, a: &PlanExtent, b: &PlanExtent) -> bool {

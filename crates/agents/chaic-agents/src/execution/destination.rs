@@ -26,6 +26,8 @@ pub struct Destination {
     pub points: Vec<Vec2>,
     /// Arrival distance from one of the points, meters.
     pub within_m: f32,
+    /// Minimum distance from the nearest point, meters; 0 for none.
+    pub min_m: f32,
     /// If set, the straight line to the point must be clear except for its last part of this
     /// length, meters, where the arm reaches over what the object lies on.
     pub arm_m: Option<f32>,
@@ -42,6 +44,7 @@ impl Destination {
         Destination {
             points: vec![point],
             within_m,
+            min_m: 0.0,
             arm_m: None,
             same_room_as: None,
             failed_positions: Vec::new(),
@@ -86,10 +89,13 @@ impl Destination {
         self.accepts(costs, here, ARRIVAL_M)
     }
 
-    /// Returns whether `here` is an arrival position, with this tolerance of the arm's reach.
+    /// Returns whether `here` is an arrival position, with this tolerance of the arm's reach and of
+    /// the minimum distance.
     pub(crate) fn accepts(&self, costs: &CostMap, here: Vec2, tolerance_m: f32) -> bool {
         let point = self.nearest_point(here);
-        point.distance(here) <= self.within_m
+        let distance_m = point.distance(here);
+        distance_m <= self.within_m
+            && distance_m + tolerance_m >= self.min_m
             && self
                 .failed_positions
                 .iter()

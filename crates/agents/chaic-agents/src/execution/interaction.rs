@@ -33,6 +33,11 @@ impl Interaction {
         Interaction { approach, failed_positions, n_failed: 0 }
     }
 
+    /// Number of failed attempts.
+    pub fn n_failed(&self) -> u32 {
+        self.n_failed
+    }
+
     /// Records that the interaction failed because of the body's position.
     pub fn record_failed_position(&mut self, here: Vec2) {
         self.failed_positions.push(here);

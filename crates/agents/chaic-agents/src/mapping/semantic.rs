@@ -459,6 +459,17 @@ impl SemanticMap {
         }
     }
 
+    /// Marks objects as absent in whose tracks perception no longer believes. Absent targets would be
+    /// evidence that somebody took them, so only [`SemanticMap::forget_missing`] decides on them.
+    pub fn withdraw(&mut self, tracks: &[TrackId], possible_targets: &[ClassId]) {
+        for track in tracks {
+            let object = self.objects.get(track);
+            if object.is_some_and(|object| !possible_targets.contains(&object.class)) {
+                self.mark_absent(*track);
+            }
+        }
+    }
+
     /// Marks an object as in play again.
     pub fn return_to_play(&mut self, track: TrackId) {
         if let Some(object) = self.objects.get_mut(&track) {

@@ -1,10 +1,10 @@
 //! The granted state: the memory knows what no image shows, and follows its changes. The history: it
-//! contains all interactions of the agent itself.
+//! contains all interactions of the agent itself. Withdrawn objects are forgotten.
 
 use super::*;
 use crate::decision::{Plan, valid_plans};
 use crate::perception::{GroundTruthIds, Perception as _};
-use crate::test_support::{Toy, ToyObject};
+use crate::test_support::{Toy, ToyObject, seen};
 
 /// Toy world whose state is granted, with the memory of an agent in it.
 struct Granted {
@@ -192,4 +192,27 @@ fn the_history_contains_interactions_only() {
     }
     let actions: Vec<Intent> = world.memory.history.iter().map(|record| record.action).collect();
     assert_eq!(actions, [pick_up, Action::PutIn]);
+}
+
+#[test]
+fn withdrawn_objects_are_forgotten_and_withdrawn_targets_are_not_taken() {
+    let toy = Toy::room(8.0, 8.0);
+    let briefing = toy.briefing();
+    let mut memory = Memory::new(&briefing, PlannerRules::paper());
+    let [bed, basket, apple] = [0, 1, 2].map(|k| TrackId(TrackId::FIRST_OWN.0 + k));
+    // Behind the agent.
+    let bed_seen = seen(bed, "bed", [2.0, 0.0, 2.0], 1.2, 0.5);
+    let basket_seen = seen(basket, "wicker_basket", [0.0, 0.0, 2.0], 0.3, 0.3);
+    let apple_seen = seen(apple, "apple", [-2.0, 0.0, 2.0], 0.1, 0.1);
+    let mut present_after = |percepts: &Percepts| {
+        memory.update(&briefing, &toy.observe(), percepts);
+        let is_present = |track| memory.objects.get(track).is_some_and(|object| object.is_present);
+        [bed, basket, apple].map(is_present)
+    };
+    let detections = vec![bed_seen, basket_seen, apple_seen];
+    let detected = Percepts { detections, ..Percepts::default() };
+    assert_eq!(present_after(&detected), [true; 3]);
+    let withdrawn = Percepts { withdrawn: vec![bed, basket, apple], ..Percepts::default() };
+    assert_eq!(present_after(&withdrawn), [false, false, true]);
+    assert_eq!(present_after(&detected), [true; 3], "all are detected again");
 }

@@ -11,7 +11,7 @@ pub const STRIDE: u32 = 2;
 /// less than the spacing of footprint points.
 const MIN_SAMPLES_PER_ROW: usize = 128;
 /// Maximum depth of points that are used for object positions, meters (facts A1.1).
-const OBJECT_RANGE_M: f32 = 10.0;
+pub const OBJECT_RANGE_M: f32 = 10.0;
 /// The same for people, who are located at any distance (facts A1.8).
 const PERSON_RANGE_M: f32 = f32::INFINITY;
 /// Maximum height of footprint points, meters: bodies do not collide above it.

@@ -6,6 +6,7 @@ use chaic_core::task::SceneKind;
 use chaic_core::{ClassId, Hand};
 
 use super::*;
+use crate::decision::Subject;
 use crate::perception::{GroundTruthIds, PixelTargets};
 use crate::perception_factory::{GroundTruthPerceptionFactory, GroundTruthTracksFactory};
 use crate::policies::{PartnerVariantPolicy, RulePolicy, RuleProfile};
@@ -456,4 +457,48 @@ fn turns_to_one_object_do_not_count_for_another() {
     assert!(turns_to(a, MAX_SEARCH_TURNS - 1));
     assert!(turns_to(b, MAX_SEARCH_TURNS));
     assert!(!turns_to(b, 1), "it turns forever");
+}
+
+#[test]
+fn what_no_image_shows_is_viewed_from_other_sides_unless_it_is_small_and_high() {
+    for (class, y, n_more_sides) in [("apple", 0.5, 1), ("apple", 2.0, 0), ("trashbin", 0.0, 3)] {
+        let is_small = class == "apple";
+        let mut toy = Toy::room(6.0, 6.0);
+        let size = if is_small { [0.16, 0.12, 0.16] } else { [0.4, 0.6, 0.4] };
+        let track = toy.add(ToyObject::new(class, [0.0, y, -2.0], size));
+        toy.size = 256;
+        toy.stand([0.0, 1.0], 0.0);
+        let briefing = toy.briefing();
+        let rules = PlannerRules { pick_within_m: MIN_PIXEL_TARGET_M, ..PlannerRules::paper() };
+        let mut episode = Episode::new(&briefing, rules);
+        episode.memory.needs_view = true;
+        let subject = Subject { track, class: ClassId::named(class) };
+        let plan = if is_small { Plan::PickUp(subject) } else { Plan::RemoveObstacle(subject) };
+        let observe_and_step = |episode: &mut Episode, toy: &Toy| {
+            let observation = toy.observe();
+            let percepts = GroundTruthIds.perceive(&observation);
+            episode.memory.update(&briefing, &observation, &percepts);
+            match episode.step(&plan) {
+                Progress::Act(intent) => intent,
+                end => panic!("{end:?}"),
+            }
+        };
+        let mut intent = observe_and_step(&mut episode, &toy);
+        while intent.is_locomotion() {
+            let target = |track| GroundTruthIds.target(track);
+            toy.apply(resolve_target(intent, target).expect("every track has a target"));
+            assert!(toy.frame < 200, "it does not arrive");
+            intent = observe_and_step(&mut episode, &toy);
+        }
+        let is_available =
+            |e: &Episode| e.memory.objects.get(track).unwrap().is_available(e.memory.frame);
+        for _ in 0..n_more_sides {
+            assert!(episode.views_from_elsewhere(intent), "{class} at {y} m");
+            assert!(is_available(&episode));
+            let walk = observe_and_step(&mut episode, &toy);
+            assert!(walk.is_locomotion(), "{class}: {walk:?}");
+        }
+        assert!(!episode.views_from_elsewhere(intent), "it looks at {class} forever");
+        assert!(!is_available(&episode));
+    }
 }

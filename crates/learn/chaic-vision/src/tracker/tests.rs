@@ -1,6 +1,6 @@
 //! Promises: an object keeps its track while it lies, is carried or is put down; two objects of one
 //! class have two tracks; uncertain objects are reported after a second detection; held objects and
-//! their contents are no detections.
+//! their contents are no detections; only images that can show an object are evidence against it.
 
 use chaic_agents::track::Carried;
 use chaic_core::Hand;
@@ -51,6 +51,8 @@ struct Observer {
     tracker: Tracker,
     now: Frame,
     pose: Pose,
+    /// Step to the right before each image, meters: the same view again is no new evidence.
+    step_m: f32,
 }
 
 impl Observer {
@@ -59,11 +61,12 @@ impl Observer {
             |(agent, role): &(AgentId, CompanionRole)| Companion { agent: *agent, role: *role };
         let companions = companions.iter().map(companion).collect();
         let tracker = Tracker { companions, height_m: 1.75, ..Tracker::default() };
-        Observer { tracker, now: 0, pose: Pose::default() }
+        Observer { tracker, now: 0, pose: Pose::default(), step_m: 0.001 }
     }
 
     fn observe(&mut self, measurements: &[Measurement]) -> Vec<Detection> {
         self.now += 10;
+        self.pose.position.x += self.step_m;
         let camera = camera(self.pose);
         // Far away, so that nothing is occluded.
         let depth_m = vec![50.0; (SIDE_PX * SIDE_PX) as usize];
@@ -78,6 +81,19 @@ impl Observer {
         });
         self.tracker.update_hands(&Hands { hands: [carried, None], is_joint: false }, None);
     }
+}
+
+fn track(observer: &Observer, id: TrackId) -> &Track {
+    observer.tracker.tracks.iter().find(|track| track.id == id).expect("it is known")
+}
+
+/// A refrigerator with these visible points from above.
+fn refrigerator(points: &[[f32; 2]]) -> Measurement {
+    let footprint: Vec<Vec2> = points.iter().map(|point| Vec2::from(*point)).collect();
+    let mean = footprint.iter().sum::<Vec2>() / footprint.len() as f32;
+    let mut seen = measurement("refrigerator", 0.9, [mean.x, 1.0, mean.y]);
+    (seen.extent.top_m, seen.extent.footprint) = (1.8, footprint);
+    seen
 }
 
 fn tracks(found: &[Detection]) -> Vec<TrackId> {
@@ -250,10 +266,12 @@ fn costs_are_bit_identical_to_those_that_compare_the_labels_of_all_pairs() {
         let [first, second] = [(); 2].map(|()| draw(&mut rng));
         let [was_in_hand, in_hand, is_released] = [0.3, 0.3, 0.2].map(|p| rng.chance(p));
         let mut tracker = Tracker::default();
-        tracker.start_track(&first, 0);
+        let seen_first = object(&first, was_in_hand);
+        tracker.start_track(&seen_first, 0);
         let (config, now) = (tracker.config, 30);
         let track = &mut tracker.tracks[0];
-        track.update(&object(&first, was_in_hand), 0, &config);
+        track.add_evidence(&first, &config);
+        track.locate(&seen_first, 0, &config);
         track.is_released = is_released;
         let (track, second) = (&tracker.tracks[0], object(&second, in_hand));
         let [cost, expected] =
@@ -393,4 +411,126 @@ fn a_missed_object_has_a_pixel_at_its_place_if_the_depth_is_that_of_the_object()
     observer.hold(Some((apple, "apple")));
     observer.observe(&[]);
     assert!(missed(&observer, depth).is_empty(), "held");
+}
+
+#[test]
+fn images_that_cannot_show_an_object_are_no_evidence_against_it() {
+    let partner = (AgentId::PARTNER, CompanionRole::Partner);
+    let is_lowered = |observer: &mut Observer, id: TrackId| {
+        let before = track(observer, id).log_odds;
+        observer.observe(&[]);
+        track(observer, id).log_odds < before
+    };
+    let ahead = [0.0, 1.0, -2.0];
+    // At rest, in full view; at the border; within the range of detections, and beyond it.
+    for (class, at, expected) in [
+        ("wicker_basket", ahead, true),
+        ("wicker_basket", [-1.9, 1.0, -2.0], false),
+        ("truck", [0.0, 1.0, -9.5], true),
+        ("truck", [0.0, 1.0, -10.5], false),
+    ] {
+        let mut observer = Observer::new(&[]);
+        let id = observer.observe(&[measurement(class, 0.9, at)])[0].track;
+        assert_eq!(is_lowered(&mut observer, id), expected, "{class} at {at:?}");
+    }
+    let mut observer = Observer::new(&[partner]);
+    let found = observer.observe(&[person(1.7, ahead), measurement("wicker_basket", 0.9, ahead)]);
+    let basket = found.iter().find(|d| d.person.is_none()).expect("the basket is visible").track;
+    assert!(!is_lowered(&mut observer, basket), "the partner carries it");
+    observer.hold(Some((basket, "wicker_basket")));
+    observer.observe(&[]);
+    observer.hold(None);
+    observer.observe(&[]);
+    // The place of the release is in view.
+    observer.pose.position.z += 2.5;
+    assert!(!is_lowered(&mut observer, basket), "it lies near the place of the release");
+}
+
+#[test]
+fn the_same_view_again_is_no_new_evidence() {
+    let mut observer = Observer::new(&[]);
+    observer.step_m = 0.0;
+    let uncertain = measurement("wicker_basket", 0.4, [0.0, 1.0, -2.0]);
+    for _ in 0..9 {
+        assert!(observer.observe(std::slice::from_ref(&uncertain)).is_empty());
+    }
+    observer.step_m = 0.1;
+    observer.observe(std::slice::from_ref(&uncertain));
+    let basket = observer.observe(std::slice::from_ref(&uncertain))[0].track;
+    let seen = track(&observer, basket).log_odds;
+    observer.observe(&[]);
+    let missed = track(&observer, basket).log_odds;
+    assert!(missed < seen, "{missed}, {seen}");
+    observer.step_m = 0.0;
+    observer.observe(&[]);
+    assert_eq!(track(&observer, basket).log_odds, missed);
+}
+
+#[test]
+fn parts_of_an_object_are_no_objects_in_any_order() {
+    let row = |from: f32, to: f32| {
+        let point = |k: u8| [from + (to - from) * f32::from(k) / 8.0, -4.0];
+        refrigerator(&[0, 1, 2, 3, 4, 5, 6, 7, 8].map(point))
+    };
+    let (left, right) = (row(0.0, 0.6), row(0.55, 0.9));
+    for parts in [[left.clone(), right.clone()], [right, left]] {
+        let mut observer = Observer::new(&[]);
+        let whole = tracks(&observer.observe(&[row(0.0, 0.9)]));
+        assert_eq!(tracks(&observer.observe(&parts)), whole);
+    }
+}
+
+#[test]
+fn a_mask_too_large_for_one_object_neither_moves_a_known_one_nor_starts_another() {
+    let front = refrigerator(&[[0.0, -4.0], [0.45, -4.0], [0.9, -4.0]]);
+    let mut observer = Observer::new(&[]);
+    let first = observer.observe(&[front]);
+    let id = first[0].track;
+    // With its surroundings on one side.
+    let larger = refrigerator(&[[-2.0, -4.0], [-1.0, -4.0], [0.0, -4.0], [0.9, -4.0]]);
+    let again = observer.observe(&[larger]);
+    assert_eq!(tracks(&again), [id]);
+    assert_eq!(again[0].position_in_world, first[0].position_in_world);
+    assert_eq!(again[0].footprint, [Vec2::new(0.0, -4.0), Vec2::new(0.9, -4.0)]);
+    // The side; then a mask that contains the center only, so that the extents do not match.
+    observer.observe(&[refrigerator(&[[0.0, -4.0], [0.0, -4.4], [0.0, -4.75]])]);
+    let before = track(&observer, id).clone();
+    let rows = [-4.4, -4.15, -3.9].map(|z| [0.2, 1.1, 2.0, 2.8].map(|x| [x, z]));
+    assert!(observer.observe(&[refrigerator(rows.as_flattened())]).is_empty());
+    assert_eq!(observer.tracker.tracks.len(), 1);
+    let after = track(&observer, id);
+    assert_eq!((after.position, after.log_odds), (before.position, before.log_odds));
+}
+
+#[test]
+fn what_lies_or_stands_beside_a_person_is_not_carried() {
+    let partner = (AgentId::PARTNER, CompanionRole::Partner);
+    let mut observer = Observer::new(&[partner]);
+    let (beside, at) = (person(1.7, [0.5, 0.9, -3.0]), [0.0, 0.8, -3.0]);
+    let stove = measurement("stove", 0.9, [1.0, 0.8, -3.0]);
+    let apple = observer.observe(&[measurement("apple", 0.9, at)])[0].track;
+    let mut is_carried = |at: [f32; 3]| {
+        observer.observe(&[beside.clone(), measurement("apple", 0.9, at), stove.clone()]);
+        let carried = observer.tracker.tracks.iter().filter(|track| track.is_carried);
+        carried.map(|track| track.id).collect::<Vec<_>>()
+    };
+    assert!(is_carried(at).is_empty(), "both are where they were");
+    assert_eq!(is_carried([0.3, 1.0, -3.0]), [apple]);
+    assert_eq!(is_carried([0.3, 1.0, -3.0]), [apple], "the person stands still");
+}
+
+#[test]
+fn a_reported_object_is_withdrawn_once_when_it_rather_does_not_exist() {
+    let mut observer = Observer::new(&[]);
+    let uncertain = measurement("refrigerator", 0.6, [0.0, 1.0, -4.0]);
+    let id = observer.observe(std::slice::from_ref(&uncertain))[0].track;
+    observer.observe(&[]);
+    assert!(observer.tracker.withdraw().is_empty(), "it may exist");
+    observer.observe(&[]);
+    assert_eq!(observer.tracker.withdraw(), [id]);
+    observer.observe(&[]);
+    assert!(observer.tracker.withdraw().is_empty(), "once");
+    // Never reported.
+    observer.observe(&[measurement("refrigerator", 0.3, [3.0, 1.0, -4.0])]);
+    assert!(observer.tracker.withdraw().is_empty(), "it was not reported");
 }

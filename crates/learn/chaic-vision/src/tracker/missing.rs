@@ -25,7 +25,7 @@ impl Tracker {
         self.tracks.iter().filter(is_missed).filter_map(pixel).collect()
     }
 
-    /// Returns the reported tracks that rather do not exist. They count as unreported until they are
+    /// Returns the reported tracks that probably do not exist. They count as unreported until they are
     /// detected again.
     pub fn withdraw(&mut self) -> Vec<TrackId> {
         let mut withdrawn = Vec::new();

@@ -87,7 +87,11 @@ mod tests {
         // Decisions alone cost nothing.
         write(&path, &[exchange("one"), exchange("four"), decided(4)]);
         fs::write(path.with_file_name("x.old-1-s0.1.jsonl.old-3.tmp"), "torn").unwrap();
-        assert_eq!(all(run).unwrap(), std::slice::from_ref(&path), "other readers ignore the copies");
+        assert_eq!(
+            all(run).unwrap(),
+            std::slice::from_ref(&path),
+            "other readers ignore the copies"
+        );
         let files = [vec![path.clone()], kept].concat();
         assert_eq!(with_copies(run).unwrap(), [files]);
         let entries = DecisionLog::read(run, &path).unwrap().entries;

@@ -76,7 +76,7 @@ pub struct Percepts {
     /// True if the image was not searched for objects, and the detections are those of an earlier
     /// image. A missing detection then means nothing.
     pub is_reused: bool,
-    /// Tracks of earlier detections that perception no longer believes in: they probably do not exist.
+    /// Tracks of earlier detections whose objects probably do not exist.
     pub withdrawn: Vec<TrackId>,
 }
 

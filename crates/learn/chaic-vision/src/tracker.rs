@@ -407,8 +407,8 @@ impl Tracker {
             && self.people.values().any(|(at, frame)| *frame == now && near(at))
     }
 
-    /// Marks the tracks within a mask of their label that is too large for one object. The mask tells
-    /// neither that they are missing nor that there is another object. Returns whether there is one.
+    /// Marks the tracks inside a mask of their label that is too large for one object: it shows neither
+    /// that they are missing nor that there is another object. Returns whether it contains a track.
     fn cover(&mut self, object: &DetectedObject<'_>, now: Frame) -> bool {
         let (config, label) = (self.config, object.measurement.label());
         let seen = object.large_extent(label).filter(|seen| config.is_oversized(label, seen));

@@ -459,8 +459,8 @@ impl SemanticMap {
         }
     }
 
-    /// Marks objects as absent in whose tracks perception no longer believes. Absent targets would be
-    /// evidence that somebody took them, so only [`SemanticMap::forget_missing`] decides on them.
+    /// Marks the objects of these tracks as absent, because they probably do not exist. Absent targets
+    /// would be evidence that somebody took them, so only [`SemanticMap::forget_missing`] decides on them.
     pub fn withdraw(&mut self, tracks: &[TrackId], possible_targets: &[ClassId]) {
         for track in tracks {
             let object = self.objects.get(track);

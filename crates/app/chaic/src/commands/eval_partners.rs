@@ -18,7 +18,7 @@ use serde_json::json;
 use super::eval_session::{
     Played, Session, how_to_complete, in_free_folder, request, write_reports,
 };
-use super::given_partners::{GivenPartners, is_partner_file};
+use super::given_partners::{GivenPartners, require_no_files};
 use super::llm::check_partner;
 use crate::arguments::{EvalArguments, LanguageArguments};
 use crate::exit::ExitStatus;
@@ -183,15 +183,8 @@ fn resumed(
         folder.check_partners(suite)?;
     }
     folder.check_started()?;
-    let partners = folder.partners();
-    let from_file = |entry: &&SuitePartner| entry.partner.as_deref().is_some_and(is_partner_file);
-    if let Some(entry) = partners.iter().find(from_file).filter(|_| given.is_none()) {
-        return Err(EvalError::Options(format!(
-            "the partner `{}` of {} comes from a file; give the list again with --partners FILE",
-            entry.name,
-            path.display()
-        ))
-        .into());
+    if given.is_none() {
+        require_no_files(&folder)?;
     }
     Ok(folder)
 }

@@ -4,8 +4,10 @@ use std::path::Path;
 
 use anyhow::Result;
 use chaic_env::helper_registry::{PARTNER_FILES, POLICY, RECORDED};
+use chaic_env::partner_suite::SuitePartner;
 use chaic_env::recording::Recordings;
 use chaic_eval::EvalError;
+use chaic_eval::suite::SuiteFolder;
 use chaic_learn::helpers::PartnerPolicy;
 use chaic_learn::partner::recordings::read_recordings;
 
@@ -46,4 +48,19 @@ impl GivenPartners {
 /// Returns whether a partner comes from a file.
 pub(super) fn is_partner_file(name: &str) -> bool {
     PARTNER_FILES.iter().any(|prefix| name.starts_with(prefix))
+}
+
+/// Refuses to continue runs without their list if a partner comes from a file, which only the list names.
+///
+/// # Errors
+/// [`EvalError::Options`] with the first such partner.
+pub(super) fn require_no_files(folder: &SuiteFolder) -> Result<()> {
+    let from_file = |entry: &&SuitePartner| entry.partner.as_deref().is_some_and(is_partner_file);
+    let Some(entry) = folder.suite().partners().iter().find(from_file) else { return Ok(()) };
+    let problem = format!(
+        "the partner `{}` of {} comes from a file; give the list again with --partners FILE",
+        entry.name,
+        folder.path().display()
+    );
+    Err(EvalError::Options(problem).into())
 }

@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 use super::bars::RunBars;
 use super::eval_partners::{partner_request, refuse_single_run, write_robustness};
 use super::eval_session::warn_of_run;
-use super::given_partners::is_partner_file;
+use super::given_partners::require_no_files;
 use super::summary::report_of;
 use crate::exit::{ExitStatus, with_hint};
 use crate::output::{
@@ -180,30 +180,13 @@ impl SubmissionPlayer<'_> {
 /// # Errors
 /// [`EvalError::Options`] with the first such partner.
 pub(super) fn refuse_language_partners(suite: &PartnerSuite) -> Result<()> {
-    let Some(entry) = find_agent(suite, is_language_partner) else { return Ok(()) };
+    let asks_model =
+        |entry: &&SuitePartner| entry.partner.as_deref().is_some_and(is_language_partner);
+    let Some(entry) = suite.partners().iter().find(asks_model) else { return Ok(()) };
     let problem = format!(
         "the partner `{}` asks a language model, which a contest does not have; remove it from the \
          list",
         entry.name
     );
     Err(EvalError::Options(problem).into())
-}
-
-/// Refuses to continue without the list if a partner comes from a file, which only the list names.
-///
-/// # Errors
-/// [`EvalError::Options`] with the first such partner.
-fn require_no_files(folder: &SuiteFolder) -> Result<()> {
-    let Some(entry) = find_agent(folder.suite(), is_partner_file) else { return Ok(()) };
-    let problem = format!(
-        "the partner `{}` of {} comes from a file; repeat --partners with the list that names it",
-        entry.name,
-        folder.path().display()
-    );
-    Err(EvalError::Options(problem).into())
-}
-
-/// Returns the first partner whose agent has a name of this kind.
-fn find_agent(suite: &PartnerSuite, is_kind: fn(&str) -> bool) -> Option<&SuitePartner> {
-    suite.partners().iter().find(|entry| entry.partner.as_deref().is_some_and(is_kind))
 }

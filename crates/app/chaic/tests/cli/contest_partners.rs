@@ -200,7 +200,7 @@ fn a_partner_from_a_file_needs_the_list_again() {
     let results = at.join("results/mine/run/learned/results.jsonl");
     let journal = read(&results);
     let refused = run_err(at, &[&PLAY[..], &["--out", "results/mine"]].concat());
-    let words = "the partner `learned` of results/mine/run comes from a file; repeat --partners";
+    let words = "the partner `learned` of results/mine/run comes from a file; give the list again";
     assert!(refused.contains(words) && refused.lines().count() == 1, "{refused}");
     play(at, "results/mine", &with_list);
     assert_eq!(read(&results), journal);

@@ -38,9 +38,9 @@ impl Tracker {
         withdrawn
     }
 
-    /// Lowers the log odds of tracks whose unoccluded place does not show them. An image says nothing
-    /// about objects that may be elsewhere (carried, or just released), that a larger mask contains,
-    /// or that are beyond the range of detections or at its border.
+    /// Lowers the log odds of tracks that are not detected although their place is visible. An image
+    /// says nothing about objects that may be elsewhere (carried, or just released), that a larger mask
+    /// contains, or that are beyond the range of detections or at its border.
     pub(super) fn penalize_missing(&mut self, now: Frame, depth_m: &[f32], camera: &Camera) {
         /// Objects nearer by more than this occlude the place, meters.
         const OCCLUSION_MARGIN_M: f32 = 0.1;

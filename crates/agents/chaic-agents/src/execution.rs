@@ -256,17 +256,14 @@ impl Executor {
     /// A small object above the eyes is hidden from all sides, by the edge of what it lies on.
     pub fn record_unseen(&mut self, memory: &Memory, track: TrackId) -> bool {
         let Some(object) = memory.objects.get(track) else { return false };
-        let eyes_above_m = memory.eyes_above_m(object);
-        let is_high = eyes_above_m.is_some_and(|m| m <= 0.0);
-        let Some(interaction) = self.interaction.as_mut().filter(|_| !is_high) else {
-            return false;
-        };
-        let max_sides = match eyes_above_m {
+        let here = memory.position();
+        self.failed_positions.push((track, here, memory.frame));
+        let max_sides = match memory.eyes_above_m(object) {
+            Some(above_m) if above_m <= 0.0 => return false,
             Some(_) => MAX_SIDES_VIEWED,
             None => memory.rules.failures.max_positions_tried,
         };
-        let here = memory.position();
-        self.failed_positions.push((track, here, memory.frame));
+        let Some(interaction) = self.interaction.as_mut() else { return false };
         interaction.record_failed_position(here);
         self.navigator.reset();
         self.has_acted = false;

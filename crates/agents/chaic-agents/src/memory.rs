@@ -184,6 +184,7 @@ impl Memory {
             self.people.iter().filter(|p| p.is_in_view).map(|p| p.position_in_world).collect();
         let people_at = if self.rules.sees_held_objects { &in_view[..] } else { &[] };
         self.objects.update(detections, people_at, self.rules.seen_held_ignore_frames, self.frame);
+        self.objects.record_viewpoint(to_xz(self.pose.position), self.frame);
         self.objects.withdraw(&percepts.withdrawn, &briefing.possible_targets);
         if self.rules.forgets_missing && !percepts.is_reused {
             self.objects.forget_missing(observation);

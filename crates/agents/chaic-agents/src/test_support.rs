@@ -338,7 +338,8 @@ impl Toy {
         self.here().distance(start)
     }
 
-    /// Steps up to an object until the arm reaches it.
+    /// Steps up to an object until the arm reaches it, or something is in the way of the body. The
+    /// hand reaches farther then.
     fn step_up(&mut self, entity: EntityId) -> Result<(), FailureReason> {
         let solid = |t: &Toy| t.solids.iter().position(|s| s.entity == entity);
         let i = solid(self).ok_or(FailureReason::OutOfReach)?;
@@ -353,7 +354,8 @@ impl Toy {
             }
             let ahead = (target - self.here()).normalize_or_zero();
             if !self.is_free(self.here() + 0.05 * ahead) {
-                return Err(FailureReason::Blocked);
+                let is_in_reach = self.solids[i].distance_from(self.here()) <= MOTION.reach_limit_m;
+                return if is_in_reach { Ok(()) } else { Err(FailureReason::Blocked) };
             }
             self.pose.position += 0.05 * Vec3::new(ahead.x, 0.0, ahead.y);
         }

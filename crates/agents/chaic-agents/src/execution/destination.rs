@@ -34,6 +34,9 @@ pub struct Destination {
     /// Center of an object from which no wall may separate the arrival position. The object may
     /// stand against a wall with the agent behind it.
     pub same_room_as: Option<Vec2>,
+    /// If set, the arrival position must be on the side of the point on which this position is:
+    /// directions with at least this cosine.
+    pub side_of: Option<(Vec2, f32)>,
     /// Positions of failed attempts; the arrival position must be on another side.
     pub failed_positions: Vec<Vec2>,
 }
@@ -47,6 +50,7 @@ impl Destination {
             min_m: 0.0,
             arm_m: None,
             same_room_as: None,
+            side_of: None,
             failed_positions: Vec::new(),
         }
     }
@@ -96,6 +100,7 @@ impl Destination {
         let distance_m = point.distance(here);
         distance_m <= self.within_m
             && distance_m + tolerance_m >= self.min_m
+            && self.side_of.is_none_or(|(at, cos)| cosine(at - point, here - point) >= cos)
             && self
                 .failed_positions
                 .iter()
@@ -122,13 +127,17 @@ impl Destination {
             // A failure near a large object was probably caused by a wall, so this side is
             // excluded.
             let (a, b) = (failed - center, here - center);
-            return a.normalize_or_zero().dot(b.normalize_or_zero()) < AVOID_COS_LARGE;
+            return cosine(a, b) < AVOID_COS_LARGE;
         }
         let failed_point = self.nearest_point(failed);
-        let (a, b) = (failed - failed_point, here - point);
         failed_point.distance(point) > AVOID_POINTS_M
-            || a.normalize_or_zero().dot(b.normalize_or_zero()) < AVOID_COS
+            || cosine(failed - failed_point, here - point) < AVOID_COS
     }
+}
+
+/// Returns the cosine between two directions; 0 if one of them is undefined.
+fn cosine(a: Vec2, b: Vec2) -> f32 {
+    a.normalize_or_zero().dot(b.normalize_or_zero())
 }
 
 /// Returns whether the body can move from `from` to within an arm's length of `to`.

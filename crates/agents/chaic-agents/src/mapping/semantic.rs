@@ -53,6 +53,8 @@ pub struct MappedObject {
     pub first_seen: Frame,
     /// Frame of the last sighting.
     pub last_seen: Frame,
+    /// Where the agent stood at the nearest sighting in this place, if there is one.
+    pub seen_from: Option<Vec2>,
     /// The agent ignores it before this frame.
     pub ignore_until: Frame,
     /// It counts as held by another agent before this frame.
@@ -113,6 +115,7 @@ impl MappedObject {
             footprint: detection.footprint.clone(),
             first_seen: now,
             last_seen: now,
+            seen_from: None,
             ignore_until: 0,
             held_until: 0,
             failures: 0,
@@ -135,6 +138,7 @@ impl MappedObject {
             footprint: object.footprint.clone(),
             first_seen: now,
             last_seen: 0,
+            seen_from: None,
             ignore_until: 0,
             held_until: 0,
             failures: 0,
@@ -191,6 +195,7 @@ impl MappedObject {
             self.footprint.clone_from(&detection.footprint);
             (self.bottom_m, self.top_m) = (detection.bottom_m, detection.top_m);
         }
+        self.seen_from = self.seen_from.filter(|_| !has_moved);
         self.class = detection.class;
         self.position_in_world = detection.position_in_world;
         self.last_seen = now;
@@ -456,6 +461,16 @@ impl SemanticMap {
         if let Some(object) = self.objects.get_mut(&track) {
             self.layout_version += u32::from(object.is_present);
             object.is_present = false;
+        }
+    }
+
+    /// Records the agent's position for all objects that are in view now and were not seen from a
+    /// nearer one.
+    pub fn record_viewpoint(&mut self, here: Vec2, now: Frame) {
+        for object in self.objects.values_mut().filter(|o| o.last_seen == now) {
+            let at = to_xz(object.position_in_world);
+            let is_nearer = |from: &Vec2| from.distance(at) < here.distance(at);
+            object.seen_from = object.seen_from.filter(is_nearer).or(Some(here));
         }
     }
 

@@ -4,7 +4,7 @@ mod check;
 
 use std::path::{Path, PathBuf};
 
-use chaic_files::read_user_file;
+use chaic_files::{read_user_file, toml_message};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{LlmError, Result};
@@ -332,7 +332,7 @@ impl Settings {
         }
         let text = String::from_utf8(bytes).map_err(|e| wrong(e.to_string()))?;
         let mut settings: Settings =
-            toml::from_str(&text).map_err(|e| wrong(message_with_line(&text, &e)))?;
+            toml::from_str(&text).map_err(|e| wrong(toml_message(&text, e.span(), e.message())))?;
         // TOML has no null; nan and inf become null in JSON.
         if let Some((name, _)) =
             settings.request.extra.iter().find(|(_, value)| contains_null(value))
@@ -366,15 +366,6 @@ fn contains_null(value: &serde_json::Value) -> bool {
         Value::Array(values) => values.iter().any(contains_null),
         Value::Object(fields) => fields.values().any(contains_null),
         _ => false,
-    }
-}
-
-/// Formats an error of the TOML parser on one line, with the number of the line in the file.
-fn message_with_line(text: &str, error: &toml::de::Error) -> String {
-    let message = error.message().replace('\n', " ");
-    match error.span().and_then(|span| text.get(..span.start)) {
-        Some(before) => format!("line {}: {message}", before.matches('\n').count() + 1),
-        None => message,
     }
 }
 

@@ -458,11 +458,6 @@ impl Granted {
 }
 
 impl Observation {
-    /// Returns the position of the camera in the world, meters.
-    pub fn eye(&self) -> Vec3 {
-        self.camera.eye_in_world
-    }
-
     /// Returns the observation of an agent with these grants except ids.
     pub fn without_ids(&self, grants: Grants) -> Observation {
         let mut observation = self.clone();

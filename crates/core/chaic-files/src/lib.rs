@@ -1,6 +1,6 @@
 //! Atomic file writes, reads that never block on a writer, and locks on folders.
 //!
-//! **What it is not**: it knows no file formats.
+//! **What it is not**: it parses no file formats. [`toml_message`] words the errors of a parser of TOML.
 //!
 //! **Invariant**: only regular files are read, and each read has a limit. Links are followed only
 //! in paths from a user, never inside a folder of chaic, for reads and writes alike.
@@ -21,6 +21,7 @@ mod change;
 pub mod faults;
 mod lock;
 mod temporary_file;
+mod toml_message;
 
 use std::ffi::OsString;
 use std::fs;
@@ -30,6 +31,7 @@ use std::path::{Path, PathBuf};
 pub use change::{create_folders, remove_empty_folder, remove_file, remove_folder, rename};
 pub use lock::{FolderLock, LOCK, LockError};
 pub use temporary_file::{TEMPORARY_SUFFIX, TemporaryFile};
+pub use toml_message::{large_integer, toml_message, toml_problem};
 
 use crate::faults::perform_rename;
 

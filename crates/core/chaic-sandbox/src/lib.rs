@@ -28,5 +28,5 @@ mod request;
 
 pub use isolation::{Isolation, IsolationPart, MissingPart};
 pub use launcher::{Launcher, SandboxError, run_stage};
-pub use policy::{Policy, PolicyError};
+pub use policy::{Policy, PolicyError, named_files};
 pub use request::STAGE_ARGUMENT;

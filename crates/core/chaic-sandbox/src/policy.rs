@@ -152,6 +152,15 @@ fn split_words(line: &str) -> Vec<String> {
     line.split(is_separator).map(unquoted).filter(|word| !word.is_empty()).collect()
 }
 
+/// Returns the words of a command line that name files, relative to the current folder: programs by their
+/// path, scripts and other arguments. Leaves out files into which output is redirected.
+pub fn named_files(line: &str) -> Vec<String> {
+    // The first word behind a `>` is the file of the output.
+    let parts = line.split('>').enumerate();
+    let words = parts.flat_map(|(k, part)| split_words(part).into_iter().skip(usize::from(k > 0)));
+    words.filter(|word| Path::new(word).is_file()).collect()
+}
+
 /// Returns the installation folder of a program: its folder, or the parent of a folder `bin` or
 /// `shims`.
 fn installation_folder(program: &Path) -> Option<&Path> {
@@ -255,6 +264,23 @@ mod tests {
         policy.masked.push(top.join("runs/one"));
         policy.add_from_command_line(&format!("cat {}", top.join("runs").display()));
         assert!(!policy.is_readable(&top.join("runs/two")));
+    }
+
+    #[test]
+    fn files_of_a_command_line_are_named_without_those_of_its_output() {
+        let top = tempfile::tempdir().unwrap();
+        let file = |name: &str| {
+            let path = top.path().join(name);
+            std::fs::write(&path, "").unwrap();
+            path.display().to_string()
+        };
+        let [program, script, log] = ["program", "helper.py", "log"].map(file);
+        let folder = top.path().display();
+        let line =
+            format!("'{program}' {script} --in={script} {folder} {folder}/none 2>&1 >>{log}");
+        assert_eq!(named_files(&line), [program, script.clone(), script]);
+        assert_eq!(named_files(&format!("sh -c ':' 2> {log} < {log}")), [log]);
+        assert!(named_files("no-program-of-this-folder --flag").is_empty());
     }
 
     #[test]

@@ -8,6 +8,7 @@ use chaic_core::observation::Grants;
 use chaic_env::helper_registry::check_new_name;
 use chaic_env::{CHAIC_VERSION, Track};
 use chaic_episodes::Split;
+use chaic_files::toml_problem;
 use serde::{Deserialize, Deserializer, de};
 
 use crate::archive::check_path;
@@ -307,7 +308,7 @@ fn quoted(value: &str) -> String {
 /// Formats an error of the TOML parser on one line, with the line in the file and the field. The error can
 /// quote any part of the file, so control characters become spaces and the text is cut.
 fn located(text: &str, field: &str, error: &toml::de::Error) -> String {
-    let message = error.message();
+    let message = toml_problem(text, error.span(), error.message());
     let before = error.span().and_then(|span| text.get(..span.start));
     let line = before.map(|before| format!("line {}", before.matches('\n').count() + 1));
     let field = (!["", "."].contains(&field)).then(|| format!("`{field}`"));

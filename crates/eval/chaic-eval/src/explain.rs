@@ -34,14 +34,15 @@ const PREFERRED_HELPER: &str = "infer";
 /// Those of [`replay::find_trace`].
 pub fn find_trace(
     folder: &RunFolder,
+    traces: &[PathBuf],
     episode: &str,
     helper: Option<&str>,
     seed: Option<u32>,
 ) -> Result<PathBuf> {
     match helper {
-        Some(_) => replay::find_trace(folder, episode, helper, seed),
-        None => replay::find_trace(folder, episode, Some(PREFERRED_HELPER), seed)
-            .or_else(|_| replay::find_trace(folder, episode, None, seed)),
+        Some(_) => replay::find_trace(folder, traces, episode, helper, seed),
+        None => replay::find_trace(folder, traces, episode, Some(PREFERRED_HELPER), seed)
+            .or_else(|_| replay::find_trace(folder, traces, episode, None, seed)),
     }
 }
 

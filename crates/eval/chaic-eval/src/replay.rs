@@ -59,19 +59,17 @@ fn preference(helper: &str) -> usize {
     }
 }
 
-/// Returns the paths of the traces of an episode, by its id with or without the task, with their
-/// helpers; those of all episodes, helpers and seeds if none is given.
-///
-/// # Errors
-/// If the folder cannot be read.
+/// Returns those of these traces that are of an episode, by its id with or without the task, with their
+/// helpers; those of all episodes, helpers and seeds if none is given. `traces` are the
+/// [`planned_traces`](crate::run::planned_traces) of a run.
 pub fn find_traces(
-    folder: &RunFolder,
+    traces: &[PathBuf],
     episode: Option<&str>,
     helper: Option<&str>,
     seed: Option<u32>,
-) -> Result<Vec<(PathBuf, String)>> {
+) -> Vec<(PathBuf, String)> {
     let mut found = Vec::new();
-    for path in folder.traces()? {
+    for path in traces {
         // traces/TASK/HELPER/EPISODE-sSEED.jsonl
         let part = |up: usize| path.iter().rev().nth(up).and_then(|p| p.to_str()).unwrap_or("");
         let stem = part(0).trim_end_matches(".jsonl");
@@ -81,25 +79,26 @@ pub fn find_traces(
             && helper.is_none_or(|h| h == part(1))
             && seed.is_none_or(|s| trace_seed == s.to_string());
         if matches {
-            let helper = part(1).to_owned();
-            found.push((path, helper));
+            found.push((path.clone(), part(1).to_owned()));
         }
     }
-    Ok(found)
+    found
 }
 
-/// Returns the path of the trace of an episode, by its id with or without the task. Without
-/// `helper` and `seed`, selects the preferred helper and its lowest seed.
+/// Returns the path of the trace of an episode, by its id with or without the task, among the
+/// [`planned_traces`](crate::run::planned_traces) of a run. Without `helper` and `seed`, selects the
+/// preferred helper and its lowest seed.
 ///
 /// # Errors
 /// If there is no such trace; the message lists existing ones.
 pub fn find_trace(
     folder: &RunFolder,
+    traces: &[PathBuf],
     episode: &str,
     helper: Option<&str>,
     seed: Option<u32>,
 ) -> Result<PathBuf> {
-    let found = find_traces(folder, Some(episode), helper, seed)?;
+    let found = find_traces(traces, Some(episode), helper, seed);
     // Seeds are compared as numbers. In the order of paths, 10 is before 2.
     let order = |(path, helper): &(PathBuf, String)| {
         (preference(helper), path.parent().map(Path::to_owned), seed_of(path).unwrap_or(u32::MAX))
@@ -107,7 +106,6 @@ pub fn find_trace(
     if let Some((path, _)) = found.into_iter().min_by_key(order) {
         return Ok(path);
     }
-    let traces = folder.traces()?;
     let examples: Vec<String> = traces
         .iter()
         .take(3)

@@ -9,6 +9,7 @@ mod environment;
 mod estimate;
 mod folder;
 mod granted;
+mod helper_files;
 mod journal;
 mod options;
 mod plan;
@@ -22,12 +23,13 @@ pub use comparison::{ComparedRun, check_same_episodes};
 pub use folder::{FolderMode, RunFolder};
 pub(crate) use folder::{PARTNERS_FILE, has_partners};
 pub use granted::RunGrants;
+pub use helper_files::{HelperFiles, file_digests};
 pub(crate) use journal::read_journal;
 pub use journal::{Journal, read_results};
 pub(crate) use options::FILES;
 pub use options::{MAX_IMAGE_SIZE, MIN_IMAGE_SIZE, RunOptions, RunRequest};
 pub use plan::{EpisodeJob, environments, planned};
-pub use planned_traces::visit_planned_traces;
+pub use planned_traces::{misplaced_trace, planned_traces, visit_planned_traces};
 pub(crate) use shard::reopen_merged;
 pub use shard::{Shard, merge};
 pub use worker::{FinishedJob, JobEvent};
@@ -264,6 +266,8 @@ struct NewRun {
     planned: Vec<EpisodeJob>,
     /// Episodes from files; `None` if the episodes are from a split.
     episodes: Option<Vec<Episode>>,
+    /// Files of the commands of its helpers.
+    files: HelperFiles,
 }
 
 impl NewRun {
@@ -287,7 +291,9 @@ impl NewRun {
         {
             plan::check_recorded(&planned, episodes.as_deref(), &playable)?;
         }
-        Ok(NewRun { options, planned, episodes })
+        let mut files = request.helper_files.clone();
+        files.retain(|helper, files| options.helpers.contains(helper) && !files.is_empty());
+        Ok(NewRun { options, planned, episodes, files })
     }
 
     /// Writes the files that a run needs, and `run.json` last. A folder without it holds no run,
@@ -299,7 +305,7 @@ impl NewRun {
         helpers.attach_run(folder.path())?;
         let granted = RunGrants::new(&self.options, helpers)?;
         let images = granted.requested_images(&self.options, helpers)?;
-        folder.write_options(&self.options, &granted, images)?;
+        folder.write_options(&self.options, &granted, images, self.files)?;
         Ok((self.options, granted, self.planned))
     }
 }
@@ -319,6 +325,7 @@ fn resume(
     let granted = RunGrants::new(&options, helpers)?;
     folder.check_grants(&granted)?;
     folder.check_images(granted.requested_images(&options, helpers)?.as_ref())?;
+    folder.check_helper_files(&request.helper_files)?;
     helpers.attach_run(folder.path())?;
     Ok((options, granted, planned))
 }

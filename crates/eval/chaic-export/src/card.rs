@@ -2,9 +2,57 @@
 //! [`crate::croissant`] makes the metadata for programs from the same facts.
 
 use std::fmt::Write as _;
+use std::str::FromStr;
 
 /// License of data in which programs decide, as an SPDX identifier.
 pub const LICENSE: &str = "MIT";
+
+/// Maximum number of characters of the name of a creator.
+const MAX_NAME: usize = 200;
+
+/// Creator of a data set.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Creator {
+    /// A person of this name.
+    Person(String),
+    /// An organization, or a group of people, of this name.
+    Organization(String),
+}
+
+impl Creator {
+    /// Returns the authors of chaic, who created what its generators give.
+    pub fn chaic() -> Creator {
+        Creator::Organization("The chaic authors".to_owned())
+    }
+
+    /// Returns the name.
+    pub fn name(&self) -> &str {
+        match self {
+            Creator::Person(name) | Creator::Organization(name) => name,
+        }
+    }
+}
+
+impl FromStr for Creator {
+    type Err = String;
+
+    /// Parses `person:NAME` or `organization:NAME`.
+    fn from_str(text: &str) -> Result<Creator, String> {
+        let (kind, name) = text.split_once(':').unwrap_or((text, ""));
+        let creator: fn(String) -> Creator = match kind {
+            "person" => Creator::Person,
+            "organization" => Creator::Organization,
+            _ => {
+                return Err(format!("no creator `{text}`; write person:NAME or organization:NAME"));
+            }
+        };
+        let name = name.trim();
+        if !(1..=MAX_NAME).contains(&name.chars().count()) || name.chars().any(char::is_control) {
+            return Err(format!("the name of a creator is one line of 1 to {MAX_NAME} characters"));
+        }
+        Ok(creator(name.to_owned()))
+    }
+}
 
 /// Facts about a data set for its card and its metadata.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -13,6 +61,8 @@ pub struct DatasetDescription {
     pub title: String,
     /// One or two sentences about the content.
     pub summary: String,
+    /// Stated creators of the data set; empty without a statement.
+    pub creators: Vec<Creator>,
     /// Origin of the data.
     pub collection: String,
     /// Uses that the data is meant for.
@@ -146,6 +196,10 @@ impl DatasetDescription {
         section("Effects on society", &[common::SOCIAL_IMPACT]);
         section("Personal data", &[self.personal_information.as_str()]);
         section("License", &[self.license.unwrap_or(common::NO_LICENSE)]);
+        if !self.creators.is_empty() {
+            let names: Vec<&str> = self.creators.iter().map(Creator::name).collect();
+            section("Creators", &names);
+        }
         self.write_content(&mut text);
         text
     }
@@ -172,5 +226,24 @@ impl DatasetDescription {
                 writeln!(text, "| `{}` | {list}{data_type} | {} |", field.name, field.description);
         }
         text.push_str("\n`croissant.json` describes the files for programs (Croissant 1.0).\n");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_creator_is_a_person_or_an_organization_with_a_name() {
+        for (text, creator) in [
+            ("person:Ada Lovelace", Creator::Person("Ada Lovelace".to_owned())),
+            ("organization: Lab: A ", Creator::Organization("Lab: A".to_owned())),
+        ] {
+            assert_eq!(text.parse(), Ok(creator), "{text}");
+        }
+        let long = format!("person:{}", "a".repeat(MAX_NAME + 1));
+        for text in ["Ada Lovelace", "person", "person: ", "Person:Ada", "person:A\nB", &long] {
+            assert!(text.parse::<Creator>().is_err(), "{text}");
+        }
     }
 }

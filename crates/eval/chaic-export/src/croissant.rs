@@ -3,7 +3,7 @@
 
 use serde_json::{Value, json};
 
-use crate::card::{DataType, DatasetDescription, Field, Place, common};
+use crate::card::{Creator, DataType, DatasetDescription, Field, Place, common};
 
 /// Reference that a user of the data cites.
 const CITATION: &str = "Du, W., Lyu, Q., Shan, J., Qi, Z., Zhang, H., Chen, S., Peng, A., Shu, T., Lee, K., Dariush, B., \
@@ -39,7 +39,7 @@ pub fn metadata(id: &str, description: &DatasetDescription) -> Value {
         || common::NO_LICENSE.to_owned(),
         |license| format!("https://spdx.org/licenses/{license}.html"),
     );
-    json!({
+    let mut metadata = json!({
         "@context": context(),
         "@type": "sc:Dataset",
         "conformsTo": [
@@ -50,7 +50,6 @@ pub fn metadata(id: &str, description: &DatasetDescription) -> Value {
         "description": description.summary,
         "license": license,
         "version": env!("CARGO_PKG_VERSION"),
-        "creator": {"@type": "sc:Organization", "name": "The chaic authors"},
         "citeAs": CITATION,
         "keywords": description.tags,
         "rai:dataCollection": description.collection,
@@ -68,7 +67,22 @@ pub fn metadata(id: &str, description: &DatasetDescription) -> Value {
             "description": records.description,
             "field": fields,
         }],
-    })
+    });
+    // Absent without a statement.
+    match &description.creators[..] {
+        [] => {}
+        [creator] => metadata["creator"] = creator_metadata(creator),
+        creators => metadata["creator"] = creators.iter().map(creator_metadata).collect(),
+    }
+    metadata
+}
+
+fn creator_metadata(creator: &Creator) -> Value {
+    let kind = match creator {
+        Creator::Person(_) => "sc:Person",
+        Creator::Organization(_) => "sc:Organization",
+    };
+    json!({"@type": kind, "name": creator.name()})
 }
 
 fn field_metadata(records: &str, files: &str, field: &Field) -> Value {

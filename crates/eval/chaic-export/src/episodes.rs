@@ -7,7 +7,7 @@ use chaic_episodes::{Episode, GeneratorSeeds, Split, generate_episode};
 use chaic_files::{create_folders, write_atomically};
 
 use crate::card::{
-    DataType, DatasetDescription, Field, FileGroup, LICENSE, Place, RecordSet, common,
+    Creator, DataType, DatasetDescription, Field, FileGroup, LICENSE, Place, RecordSet, common,
 };
 use crate::error::ExportError;
 use crate::folder::{NewFolder, write_description};
@@ -152,6 +152,7 @@ fn description(origin: Origin, n: usize) -> DatasetDescription {
             "Initial states of {n} episodes of the benchmark Constrained Human-AI Cooperation (CHAIC): a simulated \
              person with a constraint carries target objects to a goal place, and a helper assists."
         ),
+        creators: vec![Creator::chaic()],
         collection,
         uses,
         limitations: &[

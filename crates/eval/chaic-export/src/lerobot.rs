@@ -17,6 +17,7 @@ use chaic_world::World;
 use image::RgbImage;
 use serde_json::{Value, json};
 
+use crate::card::Creator;
 use crate::error::ExportError;
 use crate::folder::{NewFolder, write_description};
 use crate::table::{self, Column};
@@ -87,6 +88,7 @@ impl LeRobotOptions {
 pub struct LeRobotWriter {
     folder: NewFolder,
     options: LeRobotOptions,
+    creators: Vec<Creator>,
     tasks: Vec<String>,
     episodes: Vec<EpisodeEntry>,
     n_frames: usize,
@@ -151,12 +153,19 @@ impl LeRobotWriter {
         Ok(LeRobotWriter {
             folder: NewFolder::create(folder)?,
             options,
+            creators: Vec::new(),
             tasks: Vec::new(),
             episodes: Vec::new(),
             n_frames: 0,
             statistics: Default::default(),
             colors: Default::default(),
         })
+    }
+
+    /// States who created the data set. Without a statement, card and metadata name no creator: chaic does
+    /// not know who played or collected the episodes.
+    pub fn with_creators(self, creators: Vec<Creator>) -> LeRobotWriter {
+        LeRobotWriter { creators, ..self }
     }
 
     /// Returns the number of images per second.

@@ -174,6 +174,31 @@ fn the_card_says_whether_real_people_decided() {
 }
 
 #[test]
+fn creators_are_named_only_if_stated() {
+    let (episode, trace) = first_frame();
+    let described = |creators: &[&str]| {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("set");
+        let creators = creators.iter().map(|text| text.parse().unwrap()).collect();
+        let mut writer = LeRobotWriter::create(&out, OPTIONS).unwrap().with_creators(creators);
+        assert!(writer.add(&trace, &episode, &mut || true).unwrap());
+        writer.finish().unwrap();
+        let metadata = fs::read(out.join("croissant.json")).unwrap();
+        let metadata: serde_json::Value = serde_json::from_slice(&metadata).unwrap();
+        (metadata.get("creator").cloned(), fs::read_to_string(out.join("README.md")).unwrap())
+    };
+    let (none, card) = described(&[]);
+    assert!(none.is_none() && !card.contains("Creators"), "{card}");
+    let person = serde_json::json!({"@type": "sc:Person", "name": "Ada Lovelace"});
+    let (one, _) = described(&["person:Ada Lovelace"]);
+    assert_eq!(one.as_ref(), Some(&person));
+    let (two, card) = described(&["person:Ada Lovelace", "organization:Lab"]);
+    let lab = serde_json::json!({"@type": "sc:Organization", "name": "Lab"});
+    assert_eq!(two, Some(serde_json::json!([person, lab])));
+    assert!(card.contains("## Creators\n\n- Ada Lovelace\n- Lab\n"), "{card}");
+}
+
+#[test]
 fn a_failed_export_leaves_nothing_and_can_be_repeated() {
     let (episode, trace) = first_frame();
     let folder = tempfile::tempdir().unwrap();

@@ -113,7 +113,6 @@ impl ExperimentFolder {
         Ok(RunRequest {
             tasks: Some(tasks.clone()),
             helpers: Some(part.helpers.clone()),
-            split: None,
             n_episodes: *n_episodes,
             seeds: Some(part.seeds),
             image_size: *image_size,
@@ -121,12 +120,7 @@ impl ExperimentFolder {
             rules: Some(part.rules),
             rule_overrides: part.switch.iter().map(|rule| format!("{rule}=paper")).collect(),
             no_traces: part.switch.is_some(),
-            partner: None,
-            person: None,
-            appearance: None,
-            perception: None,
-            behavior: None,
-            track: None,
+            ..RunRequest::default()
         })
     }
 

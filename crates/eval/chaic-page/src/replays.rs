@@ -3,9 +3,8 @@
 use std::path::PathBuf;
 
 use chaic_env::RunKey;
-use chaic_env::trace::TraceWarning;
 use chaic_eval::Result;
-use chaic_eval::run::{RunFolder, RunOptions};
+use chaic_eval::run::{RunFolder, RunOptions, misplaced_trace};
 use serde_json::Value;
 
 /// Replay in a page.
@@ -31,8 +30,8 @@ pub fn no_language(_: &RunKey) -> Value {
     Value::Array(Vec::new())
 }
 
-/// Reads the replays of these traces. A damaged trace is read up to its last complete record; warnings
-/// describe what is left out.
+/// Reads the replays of these traces. A damaged trace is read up to its last complete record, and one with the
+/// name of another episode run is left out; warnings describe both.
 ///
 /// # Errors
 /// If a trace or its episode cannot be read.
@@ -41,18 +40,24 @@ pub fn read_replays(
     options: &RunOptions,
     traces: &[PathBuf],
     language: ReadLanguage<'_>,
-) -> Result<(Vec<PageReplay>, Vec<TraceWarning>)> {
+) -> Result<(Vec<PageReplay>, Vec<String>)> {
     let mut all_warnings = Vec::new();
-    let mut read = |path: &PathBuf| {
+    let mut read = |path: &PathBuf| -> Result<Option<PageReplay>> {
         let (trace, warnings) = folder.read_trace(path)?;
-        all_warnings.extend(warnings);
+        all_warnings.extend(warnings.iter().map(ToString::to_string));
         let key = trace.header.key();
+        if let Some(warning) = misplaced_trace(folder, path, &key) {
+            all_warnings.push(warning);
+            return Ok(None);
+        }
         let name = format!("{}, {}, seed {}", key.episode, key.helper, key.seed);
         let lines: Vec<String> = trace.lines().collect();
         let episode = folder.episode(options, &key)?.to_json_line();
         let language = language(&key);
-        Ok(PageReplay { key, name, trace: lines.join("\n") + "\n", episode, language })
+        let trace = lines.join("\n") + "\n";
+        Ok(Some(PageReplay { key, name, trace, episode, language }))
     };
-    let replays: Result<Vec<PageReplay>> = traces.iter().map(&mut read).collect();
+    let replays: Result<Vec<PageReplay>> =
+        traces.iter().filter_map(|path| read(path).transpose()).collect();
     Ok((replays?, all_warnings))
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use chaic_core::TaskId;
 use chaic_core::capability::PersonKind;
 use chaic_env::helper_registry::check_new_name;
-use chaic_files::read_user_file;
+use chaic_files::{read_user_file, toml_message};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Result, StudyError};
@@ -263,7 +263,9 @@ impl Study {
     pub fn read(path: &Path) -> Result<Study> {
         let file: StudyFile = {
             let text = read_text(path)?;
-            let wrong = |error| definition(path, message_with_line(&text, &error));
+            let wrong = |error: toml::de::Error| {
+                definition(path, toml_message(&text, error.span(), error.message()))
+            };
             toml::from_str(&text).map_err(wrong)?
         };
         let folder = path.parent().unwrap_or(Path::new(""));
@@ -431,13 +433,4 @@ fn read_text(path: &Path) -> Result<String> {
         return Err(definition(path, format!("is longer than {MAX_TEXT_BYTES} bytes")));
     }
     String::from_utf8(bytes).map_err(|_| definition(path, "must be UTF-8".to_owned()))
-}
-
-/// Formats an error of the TOML parser on one line, with the number of the line in the file.
-fn message_with_line(text: &str, error: &toml::de::Error) -> String {
-    let message = error.message().replace('\n', " ");
-    match error.span().and_then(|span| text.get(..span.start)) {
-        Some(before) => format!("line {}: {message}", before.matches('\n').count() + 1),
-        None => message,
-    }
 }

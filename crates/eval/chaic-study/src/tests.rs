@@ -57,6 +57,16 @@ fn errors_name_the_key_and_the_expectation() {
         ("\"SHELVES-7\"", "\"A B\"", "`completion_code` must have"),
         ("participants = 48", "participants = 0", "`participants` must be from 1 to 10000, not 0"),
         ("participants = 48", "participants = 10001", "from 1 to 10000"),
+        (
+            "participants = 48",
+            "participants = 4294967296",
+            "line 6: invalid value: integer `4294967296`, expected an integer from 0 to 4294967295",
+        ),
+        (
+            "participants = 48",
+            "participants = 99999999999999999999",
+            "line 6: 99999999999999999999 exceeds 64 bits",
+        ),
         ("timeout_minutes = 60", "timeout_minutes = 99999", "`timeout_minutes` must be from 1"),
         ("timeout_minutes = 60\n", "", "missing field `timeout_minutes`"),
         ("latin_square", "latin", "unknown variant `latin`"),

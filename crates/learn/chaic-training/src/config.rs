@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use chaic_files::{read_bounded, read_user_file};
+use chaic_files::{large_integer, read_bounded, read_user_file, toml_message};
 use serde::de::DeserializeOwned;
 use toml::Table;
 
@@ -64,23 +64,6 @@ fn parse_assignment(text: &str) -> Result<Table, String> {
     as_written.or_else(|_| match large_integer(value.trim()) {
         Some(problem) => Err(problem),
         None => parse(&format!("{key} = {}", toml::Value::from(value))),
-    })
-}
-
-/// Returns a message about an integer that exceeds 64 bits; `None` for other text.
-fn large_integer(literal: &str) -> Option<String> {
-    let without_separators = literal.replace('_', "");
-    let (prefix, rest) = without_separators.split_at_checked(2).unwrap_or_default();
-    let (digits, radix) = match prefix {
-        "0x" => (rest, 16),
-        "0o" => (rest, 8),
-        "0b" => (rest, 2),
-        _ => (without_separators.as_str(), 10),
-    };
-    let unsigned = digits.strip_prefix(['+', '-']).unwrap_or(digits);
-    let is_integer = !unsigned.is_empty() && unsigned.chars().all(|c| c.is_digit(radix));
-    (is_integer && i64::from_str_radix(digits, radix).is_err()).then(|| {
-        format!("{literal} exceeds 64 bits; integers are from {} to {}", i64::MIN, i64::MAX)
     })
 }
 
@@ -227,18 +210,12 @@ pub fn config_text<T: Trainer>(config: &T::Config) -> String {
 
 fn parse<R: DeserializeOwned>(text: &str) -> Result<R, String> {
     toml::from_str(text).map_err(|error| {
-        let before = error.span().and_then(|span| text.get(..span.start));
-        let literal = error.span().and_then(|span| text.get(span));
-        let mut message =
-            literal.and_then(large_integer).unwrap_or_else(|| error.message().replace('\n', " "));
+        let mut message = error.message().to_owned();
         // A key that occurs twice under one name is called a duplicate key.
         if message.starts_with("duplicate field") {
             message += ": it is set under its current and under its old name; remove one";
         }
-        match before {
-            Some(before) => format!("line {}: {message}", before.matches('\n').count() + 1),
-            None => message,
-        }
+        toml_message(text, error.span(), &message)
     })
 }
 
@@ -267,9 +244,6 @@ mod tests {
             let problem = parse::<Table>(&format!("a = 1\n[b]\nc = {literal}\n")).unwrap_err();
             let expected = format!("line 3: {literal} exceeds 64 bits; integers are from -9223");
             assert!(problem.starts_with(&expected), "{problem}");
-        }
-        for other in ["", "-", "9223372036854775807", "0xff", "1e30", "99999999999999999999.txt"] {
-            assert_eq!(large_integer(other), None, "{other}");
         }
     }
 

@@ -4,8 +4,8 @@ use std::sync::atomic::AtomicBool;
 
 use chaic_agents::perception_factory::GroundTruthPerceptionFactory;
 use chaic_vision::behavior::Behavior;
-use chaic_vision::behavior::clip::CROPS;
-use chaic_vision::behavior::collect::{Collector, Counts, collect};
+use chaic_vision::behavior::clip::{CROPS, Counts};
+use chaic_vision::behavior::collect::{Collector, collect};
 use chaic_vision::behavior::config::ClipCollectionConfig;
 use chaic_vision::behavior::crop::SIDE;
 use chaic_vision::views::DatasetSplit;
@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         println!("{n} episodes, {:.0} s: {counts:?}", start.elapsed().as_secs_f64());
     };
     let clips = collect(&collector, &mut progress, &AtomicBool::new(false))?;
-    let mut clips = clips.expect("the flag is not set");
+    let mut clips = clips.expect("the flag is not set").clips;
     clips.sort_by_key(|clip| (clip.is_mixed, clip.label));
     println!("{:?}, then mixed, from top to bottom", Behavior::ALL);
     let shown = CROPS / 2;

@@ -3,9 +3,10 @@
 //!
 //! [`crop`] crops a person from a frame, [`clip`] is a sequence of crops and the network's input,
 //! [`network`] is the classifier. [`collect`] makes labeled clips from episodes in which helpers
-//! follow partners, [`store`] keeps them, [`train`] is the training loop, [`report`] the
-//! evaluation. [`recognize`] is the agent's behavior model.
+//! follow partners, [`store`] keeps them, [`train`] is the training loop, [`calibration`] corrects
+//! its probabilities, [`report`] is the evaluation. [`recognize`] is the agent's behavior model.
 
+pub mod calibration;
 pub mod clip;
 pub mod collect;
 pub mod config;

@@ -101,16 +101,23 @@ fn solve(
 /// Expected calibration error over ten bins: mean difference between probability and accuracy,
 /// weighted by the number of samples of each bin.
 pub fn calibration_error(scored: &[(f32, bool)]) -> f64 {
+    let weighted = scored.iter().map(|(p, is_correct)| (*p, *is_correct, 1.0));
+    weighted_calibration_error(&weighted.collect::<Vec<_>>())
+}
+
+/// Expected calibration error of samples with a weight each; 0 without samples.
+pub fn weighted_calibration_error(scored: &[(f32, bool, f64)]) -> f64 {
     const BINS: usize = 10;
-    let mut bins = [(0.0f64, 0.0f64, 0u32); BINS];
-    for (p, is_correct) in scored {
+    let mut bins = [(0.0f64, 0.0f64); BINS];
+    let mut total = 0.0;
+    for (p, is_correct, weight) in scored {
         let bin = &mut bins[((p * BINS as f32) as usize).min(BINS - 1)];
-        bin.0 += f64::from(*p);
-        bin.1 += f64::from(u8::from(*is_correct));
-        bin.2 += 1;
+        bin.0 += weight * f64::from(*p);
+        bin.1 += weight * f64::from(u8::from(*is_correct));
+        total += weight;
     }
-    let error: f64 = bins.iter().map(|(p, correct, _)| (p - correct).abs()).sum();
-    error / scored.len().max(1) as f64
+    let error: f64 = bins.iter().map(|(p, correct)| (p - correct).abs()).sum();
+    if total > 0.0 { error / total } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -137,5 +144,8 @@ mod tests {
         let overconfident: Vec<(f32, bool)> =
             scored.iter().map(|(_, is_correct)| (0.99, *is_correct)).collect();
         assert!(calibration_error(&overconfident) > 0.1);
+        assert_eq!(calibration_error(&[]), 0.0);
+        let weighted = weighted_calibration_error(&[(0.75, true, 3.0), (0.75, false, 1.0)]);
+        assert!(weighted < 1e-9, "{weighted}");
     }
 }

@@ -230,7 +230,7 @@ mod tests {
         let bytes = complete.to_bytes().unwrap();
         refused(Some(&bytes[..bytes.len() / 2]), "not a weights file");
         let behavior = TrainedBehavior::built_in().to_bytes().unwrap();
-        refused(Some(&behavior), "weights of `chaic behavior 3`, expected `chaic detector 2");
+        refused(Some(&behavior), "weights of `chaic behavior 4`, expected `chaic detector 2");
         let one_stage = TrainedDetector { second_stage: None, ..complete };
         refused(Some(&one_stage.to_bytes().unwrap()), "lacks its second stage; train it with");
         // Evaluations and trainings between the two stages read it.

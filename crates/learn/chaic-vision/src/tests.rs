@@ -267,7 +267,7 @@ fn a_training_writes_a_checkpoint_and_readable_weights() {
 }
 
 #[test]
-fn a_training_keeps_its_blocks_and_seed() {
+fn a_training_keeps_its_blocks_seed_and_shards() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("training");
     let quiet = &mut |_: &str| ();
@@ -281,6 +281,7 @@ fn a_training_keeps_its_blocks_and_seed() {
             "`blocks` is \"dense\", but was \"depthwise\"",
         ),
         ("seed = 1", "seed = 2", "`seed` is 2, but was 1"),
+        ("shards = 2", "shards = 3", "`shards` is 3, but was 2"),
     ] {
         assert!(text.contains(line), "{text}");
         std::fs::write(out.join(CONFIG), text.replacen(line, other, 1)).unwrap();

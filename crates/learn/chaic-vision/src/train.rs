@@ -455,8 +455,8 @@ impl Trainer for DetectorLearner {
 
     fn fixed_keys() -> Vec<&'static str> {
         // The first decides about the network. The second draws the initial parameters, by which the training
-        // knows whether the second stage is trained.
-        vec!["blocks", "seed"]
+        // knows whether the second stage is trained. Step and shard number the drawn views.
+        vec!["blocks", "seed", "shards"]
     }
 
     fn network(&self) -> &Network {

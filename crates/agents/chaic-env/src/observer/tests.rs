@@ -83,6 +83,7 @@ fn hidden_ids_are_reused_with_the_other_images() {
     let (world, renderer) = world_and_renderer();
     let granted = observe(&world, &renderer, with_ids(), SENSORS).into_images();
     assert_eq!(observe(&world, &renderer, Grants::NONE, SENSORS).into_images(), granted);
+    assert!(granted.ids.is_some() && granted.rgb.is_some());
 }
 
 #[test]

@@ -161,6 +161,7 @@ fn the_caller_supplies_as_many_slots_as_people() {
     );
     assert_eq!(env.header().task, TaskId::Obstacle, "it is unchanged");
     assert_eq!(env.advance(Some(300)), Ok(AdvanceOutcome::Stopped));
+    assert!(env.snapshot().is_ok(), "agents that stand still can be copied");
     assert!(Env::with_slots(config(&three), vec![idle()]).is_err());
 }
 

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use chaic_core::{AgentId, TaskId};
 use chaic_episodes::Split;
+use chaic_export::card::Creator;
 use clap::{Args, Subcommand};
 
 use super::{Tasks, agent, task, tasks};
@@ -60,4 +61,7 @@ pub struct LeRobotArguments {
     #[arg(long, alias = "image-size", value_name = "PIXELS", default_value_t = 256)]
     #[arg(value_parser = clap::value_parser!(u32).range(16..=1024))]
     pub size: u32,
+    /// Creator that card and metadata name: person:NAME or organization:NAME; repeatable [default: none].
+    #[arg(long, value_name = "KIND:NAME")]
+    pub creator: Vec<Creator>,
 }

@@ -3,6 +3,7 @@
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
+use chaic_export::card::Creator;
 use clap::{Args, Subcommand};
 
 use super::exec::{ExecArguments, HelperList, helpers};
@@ -95,6 +96,10 @@ pub struct StudyExportArguments {
     /// Also write the verified episodes as a LeRobot data set, without practice.
     #[arg(long)]
     pub lerobot: bool,
+    /// Creator that card and metadata of the LeRobot data set name: person:NAME or organization:NAME;
+    /// repeatable [default: none].
+    #[arg(long, value_name = "KIND:NAME", requires = "lerobot")]
+    pub creator: Vec<Creator>,
 }
 
 /// `chaic study delete`.

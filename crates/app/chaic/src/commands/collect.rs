@@ -74,7 +74,7 @@ fn behavior(arguments: &CollectBehaviorArguments, format: OutputFormat) -> Resul
     let folder = ClipFolder::open(&arguments.out, split, &config, &*perception)?;
     let stop = interrupt::stop_flag()?;
     let clips = collect_clips(&arguments.clips, &*perception, split, Some(&folder), stop)?;
-    let Some(clips) = clips else {
+    let Some(clips) = clips.map(|set| set.clips) else {
         print_error("stopped; run the same command again to continue");
         return Ok(ExitStatus::Interrupted);
     };

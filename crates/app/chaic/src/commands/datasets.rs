@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use anyhow::Result;
 use chaic_agents::perception_factory::PerceptionFactory;
 use chaic_episodes::DatasetSplit;
-use chaic_vision::behavior::clip::Clip;
+use chaic_vision::behavior::clip::ClipSet;
 use chaic_vision::behavior::collect::{Collector, collect};
 use chaic_vision::behavior::config::ClipCollectionConfig;
 use chaic_vision::behavior::store::ClipFolder;
@@ -60,7 +60,7 @@ pub fn collect_clips(
     split: DatasetSplit,
     folder: Option<&ClipFolder>,
     stop: &AtomicBool,
-) -> Result<Option<Vec<Clip>>> {
+) -> Result<Option<ClipSet>> {
     let bar = bars::count_bar(u64::from(arguments.n_episodes), "episodes");
     let (config, n_threads) = (clip_config(arguments), jobs(arguments.jobs));
     let collector = Collector { split, config: &config, perception, n_threads, folder };

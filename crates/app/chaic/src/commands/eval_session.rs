@@ -9,11 +9,11 @@ use chaic_env::helper_registry::{BuiltInWithPerception, HelperRegistry};
 use chaic_env::recording::RecordedPartners;
 use chaic_eval::EvalError;
 use chaic_eval::report::write_files;
-use chaic_eval::run::{FolderMode, Run, RunRequest, Shard};
+use chaic_eval::run::{FolderMode, HelperFiles, Run, RunRequest, Shard, file_digests};
 use chaic_learn::helpers::{NamedPolicy, PolicyRegistry};
 use chaic_llm::LanguageHelpers;
 use chaic_page::write_report;
-use chaic_sandbox::Launcher;
+use chaic_sandbox::{Launcher, named_files};
 use chaic_subprocess::{CommandRegistry, HelperProgram};
 
 use super::given_partners::GivenPartners;
@@ -255,11 +255,23 @@ pub(super) fn request(arguments: &EvalArguments) -> (RunRequest, &'static str) {
         perception: arguments.perception(),
         behavior: arguments.behavior(),
         track: arguments.track,
+        helper_files: helper_files(arguments),
     };
     if request == RunRequest::default() && !arguments.resume {
         return (RunRequest { n_episodes: Some(QUICK_EPISODES), ..request }, "quick");
     }
     (request, "eval")
+}
+
+/// Returns the files that the commands of helper processes name.
+fn helper_files(arguments: &EvalArguments) -> HelperFiles {
+    let files = |argument: &HelperArgument| match argument {
+        HelperArgument::Names(_) | HelperArgument::Policy { .. } => None,
+        HelperArgument::Exec { name, line } => {
+            Some((name.clone(), file_digests(named_files(line))))
+        }
+    };
+    arguments.helpers().filter_map(files).collect()
 }
 
 /// Calls a function with the first of `runs/NAME`, `runs/NAME-2`, ... that does not exist, and with the next one

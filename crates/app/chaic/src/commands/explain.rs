@@ -13,7 +13,7 @@ pub fn run(arguments: &ExplainArguments, format: OutputFormat) -> Result<ExitSta
     let ExplainArguments { run, episode, helper, seed } = arguments;
     let recorded = read_recorded(
         run,
-        |folder| find_trace(folder, episode, helper.as_deref(), *seed),
+        |folder, traces| find_trace(folder, traces, episode, helper.as_deref(), *seed),
         "it is not explained",
     )?;
     let explanation = explain(&recorded.trace, recorded.episode.setup());

@@ -15,7 +15,7 @@ use chaic_export::episodes::EpisodeSetWriter;
 use chaic_export::lerobot::{LeRobotOptions, LeRobotWriter};
 use serde_json::json;
 
-use super::recorded::RecordedHelpers;
+use super::recorded::{RecordedHelpers, traces_of_plan};
 use super::{bars, stopped_without_result};
 use crate::arguments::{EpisodesArguments, ExportCommand, LeRobotArguments};
 use crate::exit::ExitStatus;
@@ -98,7 +98,7 @@ fn write_episodes(
 }
 
 fn lerobot(arguments: &LeRobotArguments, format: OutputFormat) -> Result<ExitStatus> {
-    let LeRobotArguments { run, out, agent, every, size, .. } = arguments;
+    let LeRobotArguments { run, out, agent, every, size, creator, .. } = arguments;
     let options_of_set = LeRobotOptions { agent: *agent, every: *every, image_size: *size };
     options_of_set.check()?;
     let (folder, options) = RunFolder::read(run)?;
@@ -110,7 +110,8 @@ fn lerobot(arguments: &LeRobotArguments, format: OutputFormat) -> Result<ExitSta
         bail!("{} has {}", folder.path().display(), nothing_selected(arguments, n_cut, &contents));
     }
     let stop = interrupt::stop_flag()?;
-    let mut writer = LeRobotWriter::create(out, options_of_set)?;
+    let writer = LeRobotWriter::create(out, options_of_set)?;
+    let mut writer = writer.with_creators(creator.clone());
     let bar = bars::count_bar(traces.len() as u64, "episodes");
     let mut n = 0;
     for path in &traces {
@@ -202,7 +203,9 @@ fn select(
     let LeRobotArguments { run, agent, helper, task, .. } = arguments;
     let helpers = RecordedHelpers::new(run, options)?;
     let mut selected = Selected { traces: Vec::new(), n_cut: 0, contents: Contents::default() };
-    for path in folder.traces()? {
+    let (traces, left_out) = traces_of_plan(folder, options)?;
+    left_out.iter().for_each(|warning| print_warning(warning));
+    for path in traces {
         let (trace, warnings) = folder.read_trace(&path)?;
         selected.contents.add(&trace.header);
         let is_wanted = helper.as_ref().is_none_or(|h| *h == trace.header.helper)

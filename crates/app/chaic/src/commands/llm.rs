@@ -20,6 +20,7 @@ use chaic_llm::{check, record, session};
 use serde_json::{Value, json};
 
 use super::given_partners::is_partner_file;
+use super::recorded::traces_of_plan;
 use super::{all_helper_names, all_partner_names, require_text};
 use crate::arguments::{EndpointArguments, EvalArguments, LanguageArguments, LlmCommand};
 use crate::exit::ExitStatus;
@@ -80,7 +81,8 @@ fn record_text(
     let has_record = |name: &&String| is_language_helper(name) || agent == AgentId::PARTNER;
     let default = options.helpers.iter().find(has_record).map(String::as_str);
     let helper = helper.or(default).context("no helper of this run used a language model")?;
-    let missing = match find_trace(&folder, episode, Some(helper), seed) {
+    let (traces, _) = traces_of_plan(&folder, &options)?;
+    let missing = match find_trace(&folder, &traces, episode, Some(helper), seed) {
         Ok(path) => {
             let (trace, warnings) = folder.read_trace(&path)?;
             for warning in warnings {

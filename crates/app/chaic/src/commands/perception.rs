@@ -188,7 +188,8 @@ fn behavior_text(report: &BehaviorReport, clips: &ClipArguments) -> String {
     }
     text + &format!(
         "\n\n{} of {} with {} perception, {} appearance; columns are predictions\n\
-         top1 {} +- {}; mean of classes {}; calibration error {}\n\
+         top1 {} +- {}; mean of classes {}\n\
+         with the frequencies in play: top1 {}; calibration error {}\n\
          mixed clips predicted as moving: {}\n",
         counted(report.clips, "clip"),
         counted(report.episodes, "episode"),
@@ -197,6 +198,7 @@ fn behavior_text(report: &BehaviorReport, clips: &ClipArguments) -> String {
         number(report.top1),
         number(report.interval),
         number(report.balanced),
+        number(report.top1_in_play),
         number(report.calibration_error),
         number(report.mixed_as_moving)
     )

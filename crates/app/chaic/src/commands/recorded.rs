@@ -8,7 +8,7 @@ use chaic_env::helper_registry::{BuiltInWithPerception, HelperRegistry};
 use chaic_env::trace::Trace;
 use chaic_episodes::Episode;
 use chaic_eval::EvalError;
-use chaic_eval::run::{RunFolder, RunOptions};
+use chaic_eval::run::{RunFolder, RunOptions, planned, planned_traces};
 use chaic_eval::verify::verify_trace;
 use chaic_learn::helpers::PolicyRegistry;
 use chaic_llm::LanguageHelpers;
@@ -25,21 +25,22 @@ pub(super) struct RecordedEpisode {
     pub is_whole: bool,
 }
 
-/// Reads and verifies the trace that `find` selects. Prints warnings about a damaged one.
-/// `result` names the missing output if the trace was altered, such as `no video is made`.
+/// Reads and verifies the trace that `find` selects among those of planned episode runs. Prints warnings
+/// about a damaged one. `result` names the missing output if the trace was altered, such as `no video is made`.
 ///
 /// # Errors
 /// If the folder is no run, or the trace is missing, unreadable or altered.
 pub(super) fn read_recorded(
     run: &Path,
-    find: impl FnOnce(&RunFolder) -> Result<PathBuf, EvalError>,
+    find: impl FnOnce(&RunFolder, &[PathBuf]) -> Result<PathBuf, EvalError>,
     result: &str,
 ) -> Result<RecordedEpisode> {
     let (folder, options) = RunFolder::read(run)?;
     if !options.traces {
         return Err(EvalError::NoTraces { path: folder.path().to_owned() }.into());
     }
-    let path = find(&folder)?;
+    let (traces, _) = traces_of_plan(&folder, &options)?;
+    let path = find(&folder, &traces)?;
     let (trace, warnings) = folder.read_trace(&path)?;
     for warning in &warnings {
         print_warning(&warning.to_string());
@@ -50,6 +51,18 @@ pub(super) fn read_recorded(
     }
     let episode = folder.episode(&options, &trace.header.key())?;
     Ok(RecordedEpisode { options, trace, episode, is_whole: warnings.is_empty() })
+}
+
+/// Returns the traces of the episode runs that a run plays, and warnings about the others. If its episodes
+/// are gone, the plan is unknown, and all traces count.
+///
+/// # Errors
+/// If a folder cannot be read.
+pub(super) fn traces_of_plan(
+    folder: &RunFolder,
+    options: &RunOptions,
+) -> Result<(Vec<PathBuf>, Vec<String>), EvalError> {
+    planned_traces(folder, &planned(folder, options).unwrap_or_default())
 }
 
 /// Helpers of a run that was played, except helper processes and policies from files.

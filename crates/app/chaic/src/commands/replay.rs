@@ -25,7 +25,7 @@ pub fn run(arguments: &ReplayArguments, format: OutputFormat) -> Result<ExitStat
     let ReplayArguments { run, episode, out, helper, seed, fps, every, masks } = arguments;
     let RecordedEpisode { options, trace, episode, is_whole } = read_recorded(
         run,
-        |folder| replay::find_trace(folder, episode, helper.as_deref(), *seed),
+        |folder, traces| replay::find_trace(folder, traces, episode, helper.as_deref(), *seed),
         "no video is made",
     )?;
     let key = trace.header.key();

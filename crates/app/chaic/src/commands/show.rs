@@ -3,7 +3,7 @@
 use anyhow::Result;
 use chaic_eval::metrics::FormulaSet;
 use chaic_eval::report::Report;
-use chaic_eval::run::{RunFolder, RunOptions, planned, read_results};
+use chaic_eval::run::{RunFolder, RunOptions, planned, planned_traces, read_results};
 use serde_json::{Value, json};
 
 use super::summary::{scores_json, scores_text};
@@ -30,7 +30,7 @@ pub fn run(arguments: &ShowArguments, format: OutputFormat) -> Result<ExitStatus
     };
     let n_failed = results.iter().filter(|result| result.summary().is_none()).count();
     let progress = Progress { planned: planned.len(), finished: results.len(), failed: n_failed };
-    let n_traces = if options.traces { folder.traces()?.len() } else { 0 };
+    let n_traces = if options.traces { planned_traces(&folder, &planned)?.0.len() } else { 0 };
     let granted = folder.granted()?;
     let version = folder.version()?.unwrap_or_default();
     let report = Report {

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail};
 use chaic_core::AgentId;
 use chaic_eval::trace_file;
+use chaic_export::card::Creator;
 use chaic_export::lerobot::{LeRobotOptions, LeRobotWriter};
 use chaic_files::write_atomically;
 use chaic_page::study_page;
@@ -150,12 +151,12 @@ fn build(arguments: &StudyBuildArguments, format: OutputFormat) -> Result<ExitSt
 
 /// Exports the data of participants.
 fn export_data(arguments: &StudyExportArguments, format: OutputFormat) -> Result<ExitStatus> {
-    let StudyExportArguments { data, study, out, lerobot } = arguments;
+    let StudyExportArguments { data, study, out, lerobot, creator } = arguments;
     let plan = read(study)?;
     let report = export(&plan, data, out)?;
     if *lerobot {
         for seat in [Seat::Partner, Seat::Helper] {
-            write_lerobot(&plan, &report.verified, seat, out)?;
+            write_lerobot(&plan, &report.verified, seat, creator, out)?;
         }
     }
     report.problems.iter().for_each(|problem| print_warning(problem));
@@ -188,6 +189,7 @@ fn write_lerobot(
     plan: &StudyPlan,
     verified: &[VerifiedTrial],
     seat: Seat,
+    creators: &[Creator],
     out: &Path,
 ) -> Result<()> {
     let has_seat = |trial: &Trial| plan.conditions()[trial.condition].seat == seat;
@@ -202,7 +204,8 @@ fn write_lerobot(
     };
     let (every, image_size) = LEROBOT;
     let folder = out.join(format!("{DERIVED}{}", agent.role_name()));
-    let mut writer = LeRobotWriter::create(&folder, LeRobotOptions { agent, every, image_size })?;
+    let writer = LeRobotWriter::create(&folder, LeRobotOptions { agent, every, image_size })?;
+    let mut writer = writer.with_creators(creators.to_vec());
     let bar = bars::count_bar(chosen.len() as u64, "episodes");
     for VerifiedTrial { path, trial } in chosen {
         let (trace, _) = trace_file::read(path)?;

@@ -101,8 +101,12 @@ fn settings_out_of_range_are_refused() {
         ("[request.extra]\nmin_p = nan", "request.extra.min_p is no finite number"),
         ("[budget]\nmax_cost = nan", "budget.max_cost is NaN"),
         ("[budget]\nmax_minutes = -1.0", "budget.max_minutes is -1"),
-        ("[budget]\ntokens = -1", "expected u64"),
-        ("[budget]\nrequests = 1.5", "expected u64"),
+        ("[budget]\ntokens = -1", "expected an integer from 0 to 9223372036854775807"),
+        ("[budget]\nrequests = 1.5", "expected an integer from 0 to 9223372036854775807"),
+        (
+            "[budget]\nrequests = 99999999999999999999",
+            "line 2: 99999999999999999999 exceeds 64 bits",
+        ),
         ("[price]\nprompt_per_million = inf", "price.prompt_per_million is inf"),
     ] {
         fs::write(at.join("llm.toml"), format!("{text}\n")).expect("the disk has space");

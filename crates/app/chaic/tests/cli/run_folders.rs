@@ -123,7 +123,7 @@ fn failed_episode_runs_count_as_zero_in_reports_from_traces() {
 }
 
 #[test]
-fn reports_from_traces_leave_out_traces_of_other_episode_runs() {
+fn traces_of_other_episode_runs_are_left_out() {
     let dir = played();
     let at = dir.path();
     let trace = at.join("run").join(TRACE);
@@ -142,6 +142,25 @@ fn reports_from_traces_leave_out_traces_of_other_episode_runs() {
     let expected =
         "gen-0-s7.jsonl: this run doesn't play that episode run, so its trace is left out";
     assert!(warnings.contains(expected), "{warnings}");
+    let export =
+        ["export", "lerobot", "run", "--agent", "partner", "--size", "32", "--every", "30"];
+    for (command, reply) in [
+        (&["view", "run"][..], "2 replays of"),
+        (&[&export[..], &["--out", "set"]].concat()[..], "set: 2 episodes"),
+    ] {
+        let out = output_of(at, command);
+        let (reply_found, warnings) = (text(&out.stdout), text(&out.stderr));
+        assert!(out.status.success() && reply_found.contains(reply), "{reply_found}{warnings}");
+        assert!(warnings.contains(expected), "{warnings}");
+    }
+    let shown = run_ok(at, &["show", "run", "--format", "json"]);
+    let shown: serde_json::Value = serde_json::from_str(&shown).expect("it is JSON");
+    assert_eq!(shown["traces"], 2);
+    for command in [&["replay", "--out", "r.gif"][..], &["explain"]] {
+        let select = ["run", "no_constraint/gen/0", "--seed", "7"];
+        let refused = run_err(at, &[&command[..1], &select[..], &command[1..]].concat());
+        assert!(refused.contains("and seed 7") && refused.contains("2 traces"), "{refused}");
+    }
     fs::remove_file(&unplanned).expect("it exists");
     // A copy in the place of another trace counts neither twice nor as the other one.
     let other = at.join("run").join(TRACE.replace("no_constraint", "moving_house"));
@@ -149,6 +168,9 @@ fn reports_from_traces_leave_out_traces_of_other_episode_runs() {
     let (found, warnings) = report();
     let expected = "it is the trace of no_constraint/gen/0 with none and seed 0, so it is left out";
     assert!(warnings.contains(expected) && warnings.contains("1 of 2 finished"), "{warnings}");
+    let out = output_of(at, &["view", "run"]);
+    assert!(text(&out.stderr).contains(expected), "{out:?}");
+    assert!(text(&out.stdout).contains("1 replay of"), "{out:?}");
     let found: serde_json::Value = serde_json::from_str(&found).expect("it is JSON");
     let counts = serde_json::json!({"planned": 2, "scored": 1, "broken": 0, "missing": 1});
     assert_eq!(found["episode_runs"], counts);

@@ -65,6 +65,33 @@ fn a_failing_helper_scores_zero_with_a_reason() {
     assert_eq!(results.lines().filter(|l| l.contains("no weights")).count(), 2, "{results}");
 }
 
+#[test]
+fn a_run_is_not_resumed_with_an_edited_script() {
+    let dir = short_episodes();
+    let at = dir.path();
+    let script = at.join("helper.sh");
+    let write = |text: &str| fs::write(&script, text).expect("the disk has space");
+    write("exit 1\n");
+    let helper = ["--helper", "exec:sh helper.sh 2>&1 --log=out.log"];
+    let play = ["eval", "--episodes", "short", "--size", "48", "--out", "run"];
+    let resume = ["eval", "--resume", "--out", "run"];
+    let status = |words: &[&str]| output_of(at, &[words, &helper[..]].concat()).status.code();
+    assert_eq!(status(&play), Some(1));
+    // Not there at the start: the helper may have written it.
+    fs::write(at.join("out.log"), "").expect("the disk has space");
+    assert_eq!(status(&resume), Some(1), "failed episode runs are played again");
+    write("exit 2\n");
+    let refused = output_of(at, &[&resume[..], &helper[..]].concat());
+    let message = text(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(2), "{message}");
+    let expected = "run was started with another content of helper.sh, which exec runs or reads";
+    assert!(message.contains(expected), "{message}");
+    fs::remove_file(&script).expect("it exists");
+    assert_eq!(status(&resume), Some(2));
+    write("exit 1\n");
+    assert_eq!(status(&resume), Some(1));
+}
+
 /// The helper prints its environment to standard error, which the run records.
 #[test]
 fn a_helper_inherits_only_the_named_environment_variables() {

@@ -138,6 +138,13 @@ fn a_signal_ends_a_validation_soon_and_resuming_repeats_it() {
     let before = fs::read_to_string(&curves).expect("it exists");
     assert!(before.lines().count() == 1 && !before.contains("validation"), "{before}");
     assert!(!at.join("o/detector.safetensors").exists());
+    // With other shards, the next step would see views again, or leave some out.
+    let config = at.join("o/config.toml");
+    let written = fs::read_to_string(&config).expect("it exists");
+    fs::write(&config, written.replace("shards = 2", "shards = 1")).expect("it is written");
+    let refused = run_err(at, &["train", "detection", "--resume", "--out", "o"]);
+    assert!(refused.contains("`shards` is 1, but was 2 when the training began"), "{refused}");
+    fs::write(&config, written).expect("it is written");
     // The resumed run repeats the validation, which can be stopped again.
     let child = start(at, &["train", "detection", "--resume", "--out", "o"]);
     std::thread::sleep(Duration::from_secs(1));

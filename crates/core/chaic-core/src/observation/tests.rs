@@ -89,6 +89,20 @@ fn each_grant_has_a_name_and_a_field_of_its_own() {
 }
 
 #[test]
+fn the_sets_of_grants_are_those_of_the_documentation() {
+    let oracle = ["ids", "goal_place", "goal", "progress", "behavior"];
+    for (grants, expected) in [
+        (Grants::IDS, &oracle[..1]),
+        (Grants::PLANNER, &oracle[..2]),
+        (Grants::PARTNER, &oracle[..3]),
+        (Grants::ORACLE, &oracle[..]),
+        (Grants::CHILD, &["ids", "positions"][..]),
+    ] {
+        assert_eq!(grants.names_beyond(Grants::NONE), expected);
+    }
+}
+
+#[test]
 fn any_channel_is_an_image_and_counts_with_its_bytes() {
     let only = |rgb, depth, ids| SensorConfig { rgb, depth, ids, ..SensorConfig::NONE };
     let n_pixels = u64::from(SensorConfig::IMAGE_SIZE).pow(2);

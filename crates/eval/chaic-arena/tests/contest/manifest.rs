@@ -92,6 +92,7 @@ fn each_problem_is_named_with_its_place() {
         ("\"obstacle\"", "\"lunch\"", "`public.tasks[0]`: unknown variant `lunch`"),
         ("\"obstacle\"", "", "`public.tasks` must name at least one task"),
         ("n_episodes = 2", "n_episodes = 0", "`public.n_episodes` is 0"),
+        ("n_episodes = 2", "n_episodes = -1", "expected an integer from 0 to 4294967295"),
         ("[public]", "[public", "line 19"),
     ] {
         assert!(GOOD.contains(from), "{from}");

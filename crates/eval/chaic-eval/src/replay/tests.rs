@@ -115,7 +115,8 @@ fn the_lowest_seed_is_selected_by_its_number() {
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(path, "").unwrap();
     }
-    let find = |helper| find_trace(&folder, "low_target/test/00", helper, None).unwrap();
+    let traces = folder.traces().unwrap();
+    let find = |helper| find_trace(&folder, &traces, "low_target/test/00", helper, None).unwrap();
     assert_eq!(find(None), trace("infer", 2));
     assert_eq!(find(Some("rhp")), trace("rhp", 1));
 }

@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{EvalError, Result};
 use crate::run::granted::{RequestedImages, RunGrants};
+use crate::run::helper_files::{HelperFiles, changed_file};
 use crate::run::options::{FILES, RunOptions};
 use crate::trace_file;
 
@@ -80,6 +81,9 @@ struct RunFile {
     /// Absent in runs of older versions, and without helpers that have an isolation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     images: Option<RequestedImages>,
+    /// Absent in runs of older versions, and without commands that name files.
+    #[serde(default, skip_serializing_if = "HelperFiles::is_empty")]
+    files: HelperFiles,
 }
 
 impl RunFile {
@@ -317,6 +321,22 @@ impl RunFolder {
         )))
     }
 
+    /// Returns the recorded files of the commands of helpers.
+    pub(crate) fn helper_files(&self) -> Result<HelperFiles> {
+        Ok(self.recorded()?.map_or_else(HelperFiles::new, |file| file.files))
+    }
+
+    /// Checks that the commands of a resumed run name files with the content that `run.json` records.
+    pub(crate) fn check_helper_files(&self, given: &HelperFiles) -> Result<()> {
+        let recorded = self.helper_files()?;
+        let Some((helper, file)) = changed_file(&recorded, given) else { return Ok(()) };
+        Err(EvalError::Options(format!(
+            "{} was started with another content of {file}, which {helper} runs or reads; restore the file, \
+             or start a new run",
+            self.path.display()
+        )))
+    }
+
     /// Returns the version of chaic that started the run if it is not this version.
     pub(crate) fn other_version(&self) -> Result<Option<String>> {
         Ok(self.recorded()?.map(|file| file.chaic).filter(|chaic| chaic != CHAIC_VERSION))
@@ -432,6 +452,7 @@ impl RunFolder {
         options: &RunOptions,
         granted: &RunGrants,
         images: Option<RequestedImages>,
+        files: HelperFiles,
     ) -> Result<()> {
         let file = RunFile {
             format: FORMAT.to_owned(),
@@ -442,6 +463,7 @@ impl RunFolder {
             options: options.clone(),
             granted: Some(granted.clone()),
             images,
+            files,
         };
         self.write(RUN_FILE, file.to_text().as_bytes())
     }

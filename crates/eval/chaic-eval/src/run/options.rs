@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::episode_file::tasks_of_files;
 use crate::error::{EvalError, Result};
+use crate::run::helper_files::HelperFiles;
 
 /// Maximum side of agents' images, pixels: 16 times the benchmark's area.
 pub const MAX_IMAGE_SIZE: u32 = 2048;
@@ -121,6 +122,9 @@ pub struct RunRequest {
     pub behavior: Option<String>,
     /// `--track`.
     pub track: Option<Track>,
+    /// Files that the commands of helper processes name. A helper without an entry is not compared on
+    /// resume.
+    pub helper_files: HelperFiles,
 }
 
 /// Value of `split` for episodes from files.

@@ -1,7 +1,7 @@
 //! Traces of the episode runs that a run plays.
 
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use chaic_env::RunKey;
 use chaic_env::trace::Trace;
@@ -9,9 +9,39 @@ use chaic_env::trace::Trace;
 use super::{EpisodeJob, RunFolder};
 use crate::error::Result;
 
-/// Calls `visit` with each trace of a planned episode run, in the order of their paths. Leaves out traces
-/// that the run does not play, and those of another episode run than their name says. An empty plan is
-/// unknown: all episode runs count as planned.
+/// Returns the paths of the traces of planned episode runs, sorted, and a warning for each trace that the
+/// run does not play, such as a copy. An empty plan is unknown: all episode runs count as planned.
+///
+/// # Errors
+/// If a folder can't be read.
+pub fn planned_traces(
+    folder: &RunFolder,
+    planned: &[EpisodeJob],
+) -> Result<(Vec<PathBuf>, Vec<String>)> {
+    let paths: BTreeSet<PathBuf> = planned.iter().map(|job| folder.trace(&job.key)).collect();
+    let is_planned = |path: &PathBuf| paths.is_empty() || paths.contains(path);
+    let (kept, left_out): (Vec<PathBuf>, Vec<PathBuf>) =
+        folder.traces()?.into_iter().partition(is_planned);
+    let warning = |path: &PathBuf| {
+        let shown = path.display();
+        format!("{shown}: this run doesn't play that episode run, so its trace is left out")
+    };
+    let warnings = left_out.iter().map(warning).collect();
+    Ok((kept, warnings))
+}
+
+/// Returns a warning if the trace of an episode run has the name of another one; such a trace is left out.
+pub fn misplaced_trace(folder: &RunFolder, path: &Path, key: &RunKey) -> Option<String> {
+    let RunKey { helper, episode, seed, .. } = key;
+    (folder.trace(key) != path).then(|| {
+        let shown = path.display();
+        format!(
+            "{shown}: it is the trace of {episode} with {helper} and seed {seed}, so it is left out"
+        )
+    })
+}
+
+/// Calls `visit` with each of the [`planned_traces`], except those that [are misplaced](misplaced_trace).
 ///
 /// Returns warnings about traces that are damaged or left out.
 ///
@@ -22,27 +52,14 @@ pub fn visit_planned_traces(
     planned: &[EpisodeJob],
     visit: &mut dyn FnMut(&Trace) -> Result<()>,
 ) -> Result<Vec<String>> {
-    let paths: BTreeSet<PathBuf> = planned.iter().map(|job| folder.trace(&job.key)).collect();
-    let mut warnings = Vec::new();
-    for path in folder.traces()? {
-        let shown = path.display();
-        if !paths.is_empty() && !paths.contains(&path) {
-            warnings.push(format!(
-                "{shown}: this run doesn't play that episode run, so its trace is left out"
-            ));
-            continue;
-        }
+    let (paths, mut warnings) = planned_traces(folder, planned)?;
+    for path in paths {
         let (trace, found) = folder.read_trace(&path)?;
         warnings.extend(found.iter().map(ToString::to_string));
-        let key = trace.header.key();
-        if folder.trace(&key) != path {
-            let RunKey { helper, episode, seed, .. } = key;
-            warnings.push(format!(
-                "{shown}: it is the trace of {episode} with {helper} and seed {seed}, so it is left out"
-            ));
-            continue;
+        match misplaced_trace(folder, &path, &trace.header.key()) {
+            Some(warning) => warnings.push(warning),
+            None => visit(&trace)?,
         }
-        visit(&trace)?;
     }
     Ok(warnings)
 }

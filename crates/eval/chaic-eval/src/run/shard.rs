@@ -14,6 +14,7 @@ use chaic_files::{
 use serde_json::Value;
 
 use super::folder::{COMMANDS, EPISODES, RECORDS};
+use super::helper_files::{HelperFiles, common_files};
 use super::journal::{Journal, read_results, to_line};
 use super::options::{FILES, RunOptions};
 use super::plan;
@@ -77,9 +78,9 @@ impl FromStr for Shard {
 /// same merge can be repeated.
 ///
 /// # Errors
-/// If the parts are of different runs, episode files or commands of helpers; if they have different
-/// results of an episode run, or helpers that query language models; if a finished episode run has
-/// no trace; if files can't be read or written.
+/// If the parts are of different runs, episode files, commands of helpers or files that these name; if
+/// they have different results of an episode run, or helpers that query language models; if a finished
+/// episode run has no trace; if files can't be read or written.
 pub fn merge(out: &Path, parts: &[PathBuf]) -> Result<Run> {
     let Some(first) = parts.first() else {
         return Err(EvalError::Options("name the runs to merge".to_owned()));
@@ -90,6 +91,7 @@ pub fn merge(out: &Path, parts: &[PathBuf]) -> Result<Run> {
         EvalError::Options(format!("{} was started by an older version of chaic", first.display()))
     })?;
     let images = source.images()?;
+    let files = files_of_parts(&folders, &source)?;
     let planned = plan::planned(&source, &options)?;
     let from_parts = results(&folders, &planned)?;
     let is_traced = |result: &RunResult| options.traces && result.summary().is_some();
@@ -116,7 +118,7 @@ pub fn merge(out: &Path, parts: &[PathBuf]) -> Result<Run> {
         let report = Report { version, options, results, planned, granted, formulas };
         write_files(&folder, &report)?;
     }
-    folder.write_options(&options, &granted, images)?;
+    folder.write_options(&options, &granted, images, files)?;
     folder.end_merge()?;
     let (journal, results, _) = Journal::open(&folder.results(), &planned)?;
     Ok(Run { folder, options, granted, journal, planned, results, untraced: Vec::new() })
@@ -172,6 +174,25 @@ fn read_parts(
     Ok(folders)
 }
 
+/// Returns the files of the commands of helpers that all parts record.
+///
+/// # Errors
+/// If a part was played with another content of one of them.
+fn files_of_parts(parts: &[RunFolder], first: &RunFolder) -> Result<HelperFiles> {
+    let mut files = first.helper_files()?;
+    for part in parts {
+        files = common_files(files, &part.helper_files()?).ok_or_else(|| {
+            EvalError::Options(format!(
+                "{} and {} were played with different files of the commands of helpers; play all shards with \
+                 the same ones",
+                first.path().display(),
+                part.path().display()
+            ))
+        })?;
+    }
+    Ok(files)
+}
+
 /// Returns the recorded commands of a run's helper processes, sorted; empty without any. The file
 /// has the order of the last `--helper` options, which may change when a run is resumed.
 fn commands(folder: &RunFolder) -> Result<Vec<String>> {
@@ -197,12 +218,14 @@ pub(crate) fn reopen_merged(out: &Path, parts: &[PathBuf]) -> Result<Run> {
     let (folder, recorded) = RunFolder::lock(out, FolderMode::Resume)?;
     let (options, granted) = recorded.zip(folder.granted()?).ok_or_else(other_run)?;
     let (merged_commands, images) = (commands(&folder)?, folder.images()?);
+    let files = folder.helper_files()?;
     let mut folders = Vec::with_capacity(parts.len());
     for part in parts {
         let (part, part_options) = RunFolder::read(part)?;
         let is_same = part_options == options
             && part.granted()?.as_ref() == Some(&granted)
             && part.images()? == images
+            && common_files(part.helper_files()?, &files).is_some()
             && commands(&part)? == merged_commands;
         if !is_same || (options.split == FILES && !plan::same_copies(&part, &folder)?) {
             return Err(other_run());

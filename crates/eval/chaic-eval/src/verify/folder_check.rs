@@ -163,6 +163,9 @@ impl FolderCheck<'_> {
                 add(&format!("it names the {what} of helpers that do not play"));
             }
         }
+        if !self.folder.helper_files()?.keys().all(|name| helpers.contains(name)) {
+            add("it names the files of helpers that do not play");
+        }
         Ok(())
     }
 }

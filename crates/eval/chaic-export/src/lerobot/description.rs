@@ -116,6 +116,7 @@ impl LeRobotWriter {
                 "Observations and actions of the {agent} in {n} recorded episodes of the benchmark Constrained Human-AI \
                  Cooperation (CHAIC), in version 3.0 of the LeRobot format."
             ),
+            creators: self.creators.clone(),
             collection: format!(
                 "Recorded by chaic {} and played again for the images, which have {} pixels a side and {} samples per \
                  second (`chaic export lerobot`). Each trace was verified before.",

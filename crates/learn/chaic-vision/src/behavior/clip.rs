@@ -3,7 +3,7 @@
 use chaic_core::rng::RngStream;
 
 use super::Behavior;
-use super::crop::{CENTER_HEIGHT_M, PersonCrop, SIDE, SLACK_M, WINDOW_M};
+use super::crop::{CENTER_HEIGHT_M, PersonCrop, SIDE, SLACK_M};
 
 /// Crops that the network reads: 96 frames, 3.2 seconds.
 pub const CROPS: usize = 32;
@@ -11,8 +11,10 @@ pub const CROPS: usize = 32;
 pub const SLACK: usize = 4;
 /// Channels of a pixel: red, green and blue from -1 to 1, depth relative to the person, height
 /// above the crop's center, whether it is near the person's axis, brightness and depth in the
-/// previous crop, the person's distance and speed.
+/// previous crop, the person's distance and speed (-1 if unknown).
 pub const N_CHANNELS: usize = 10;
+/// Minimum fraction of [`CROPS`] crops that show the person (paper: 20 % of an action's observations).
+pub const MIN_SEEN_FRACTION: f32 = 0.2;
 
 /// Labeled clip.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,6 +28,52 @@ pub struct Clip {
     pub episode: u32,
     /// [`CROPS`] and [`SLACK`] crops, oldest first.
     pub crops: Vec<PersonCrop>,
+}
+
+impl Clip {
+    /// Returns the index of the clip's kind in [`Counts`].
+    pub fn kind(&self) -> usize {
+        if self.is_mixed { MIXED } else { self.label.index() }
+    }
+}
+
+/// Index of mixed clips in [`Counts`].
+pub const MIXED: usize = Behavior::ALL.len();
+
+/// Number of clips of each behavior; mixed clips are last.
+pub type Counts = [usize; MIXED + 1];
+
+/// Clips of some episodes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ClipSet {
+    /// The clips.
+    pub clips: Vec<Clip>,
+    /// Number of all clips that the episodes gave, with those beyond the maximum of their kind. These are the
+    /// relative frequencies of what helpers see.
+    pub found: Counts,
+}
+
+impl ClipSet {
+    /// Creates the set of all clips that episodes gave.
+    pub fn new(clips: Vec<Clip>) -> ClipSet {
+        let mut found = Counts::default();
+        clips.iter().for_each(|clip| found[clip.kind()] += 1);
+        ClipSet { clips, found }
+    }
+
+    /// Returns the weight of each clip with which kinds are as frequent as helpers see them.
+    pub fn weights(&self) -> Vec<f64> {
+        let mut kept = Counts::default();
+        self.clips.iter().for_each(|clip| kept[clip.kind()] += 1);
+        let weight = |clip: &Clip| self.found[clip.kind()] as f64 / kept[clip.kind()] as f64;
+        self.clips.iter().map(weight).collect()
+    }
+}
+
+/// Returns whether enough crops of a clip show the person.
+pub fn is_seen_enough<'a>(crops: impl IntoIterator<Item = &'a PersonCrop>) -> bool {
+    let n_seen = crops.into_iter().filter(|crop| crop.is_seen).count();
+    n_seen as f32 >= MIN_SEEN_FRACTION * CROPS as f32
 }
 
 /// Augmentation of a clip during training.
@@ -105,10 +153,10 @@ fn fill_crop(
     augmentation: &ClipAugmentation,
     out: &mut [f32],
 ) {
-    const STEP_M: f32 = WINDOW_M / SIDE as f32;
     /// Maximum distance from the person's axis of pixels that likely show the person, meters.
     const NEAR_AXIS_M: f32 = 0.55;
-    let motion = [0.2 * crop.distance_m, (20.0 * crop.speed).min(2.0)];
+    let speed = crop.speed.map_or(-1.0, |speed| (20.0 * speed).min(2.0));
+    let motion = [0.2 * crop.distance_m, speed];
     for (k, pixel) in out.as_chunks_mut::<N_CHANNELS>().0.iter_mut().enumerate() {
         *pixel = [0.0; N_CHANNELS];
         pixel[8..].copy_from_slice(&motion);
@@ -124,9 +172,7 @@ fn fill_crop(
             continue;
         }
         let behind_m = PersonCrop::behind_m(crop.depth[at]) + augmentation.depth_offset_m;
-        let scale = STEP_M * (1.0 + behind_m / crop.distance_m);
-        let lateral_m = (column as f32 + 0.5 - 0.5 * SIDE as f32) * scale;
-        let above_m = (0.5 * SIDE as f32 - row as f32 - 0.5) * scale;
+        let [lateral_m, above_m] = crop.offsets_m(column as usize, row as usize, behind_m);
         let color = |crop: &PersonCrop, c: usize| {
             (f32::from(crop.rgb[3 * at + c]) / 127.5 * augmentation.gain[c]).min(2.0) - 1.0
         };

@@ -21,7 +21,7 @@ use chaic_nn::normal;
 use chaic_world::EventKind;
 
 use super::Behavior;
-use super::clip::{CROPS, Clip, SLACK};
+use super::clip::{CROPS, Clip, ClipSet, Counts, SLACK, is_seen_enough};
 use super::config::ClipCollectionConfig;
 use super::crop::{HISTORY, PersonCrop, PersonCropper, visible_position};
 use super::store::{ClipFolder, StoreError};
@@ -32,8 +32,6 @@ use crate::perception_registry::NOISY;
 use crate::trained::TrainedDetector;
 use crate::views::DatasetSplit;
 
-/// Minimum fraction of crops that show the person (paper: 20 % of an action's observations).
-const MIN_SEEN_FRACTION: f32 = 0.2;
 /// Crops between the starts of two clips of a moving person.
 const MOVING_STEP: usize = 24;
 /// Clips exclude interactions that ended within this time before their end, frames.
@@ -55,9 +53,6 @@ const TASKS: [(TaskId, usize); 12] = [
     (TaskId::Tires, 1),
     (TaskId::Tremor, 1),
 ];
-
-/// Number of clips of each behavior; mixed clips are last.
-pub type Counts = [usize; Behavior::ALL.len() + 1];
 
 /// Source of clips.
 #[derive(Clone, Copy)]
@@ -84,9 +79,9 @@ pub fn collect(
     collector: &Collector<'_>,
     progress: &mut dyn FnMut(usize, &Counts),
     stop: &AtomicBool,
-) -> Result<Option<Vec<Clip>>, StoreError> {
+) -> Result<Option<ClipSet>, StoreError> {
     let Collector { split, config, perception, n_threads, folder } = *collector;
-    let (mut clips, mut counts): (Vec<Clip>, Counts) = Default::default();
+    let (mut collected, mut counts): (ClipSet, Counts) = Default::default();
     let learned_perception = (config.learned_fraction > 0.0)
         .then(|| LearnedPerceptionFactory::new(TrainedDetector::built_in()));
     let noisy_perception =
@@ -104,7 +99,7 @@ pub fn collect(
     };
     for first in (0..config.episodes).step_by(EPISODES_PER_ROUND) {
         if counts.iter().all(|n| *n >= config.max_per_class) {
-            return Ok(Some(clips));
+            return Ok(Some(collected));
         }
         progress(first, &counts);
         let stored = folder.map_or(Ok(None), |folder| folder.read(first))?;
@@ -116,22 +111,23 @@ pub fn collect(
             };
             let new_clips = map_in_order(indices, n_threads, stop, || (), play_episode)?;
             // A round with an interrupted episode is played again.
-            (!stop.load(Ordering::Relaxed)).then(|| new_clips.into_iter().flatten().collect())
+            (!stop.load(Ordering::Relaxed))
+                .then(|| ClipSet::new(new_clips.into_iter().flatten().collect()))
         };
-        let Some(mut new_clips) = stored.or_else(play_round) else { return Ok(None) };
-        new_clips.retain(|clip| {
-            let kind = if clip.is_mixed { counts.len() - 1 } else { clip.label.index() };
-            counts[kind] += 1;
-            counts[kind] <= config.max_per_class
+        let Some(mut round) = stored.or_else(play_round) else { return Ok(None) };
+        round.clips.retain(|clip| {
+            let is_kept = counts[clip.kind()] < config.max_per_class;
+            counts[clip.kind()] += usize::from(is_kept);
+            is_kept
         });
-        counts.iter_mut().for_each(|n| *n = (*n).min(config.max_per_class));
         if let Some(folder) = folder.filter(|_| is_new) {
-            folder.write(first, &new_clips)?;
+            folder.write(first, &round)?;
         }
-        clips.extend(new_clips);
+        collected.found.iter_mut().zip(round.found).for_each(|(found, n)| *found += n);
+        collected.clips.extend(round.clips);
     }
     progress(config.episodes, &counts);
-    Ok(Some(clips))
+    Ok(Some(collected))
 }
 
 /// Returns the clips of one episode; none if `stop` is set meanwhile.
@@ -271,6 +267,14 @@ impl Interactions {
         }
     }
 
+    /// Returns all interactions. One that the end of the episode interrupts has no outcome; its clips show
+    /// an action that still runs.
+    fn all(&self) -> impl Iterator<Item = Interaction> + '_ {
+        let interrupted =
+            self.started.map(|started| Interaction { started, end: Frame::MAX, behavior: None });
+        self.ended.iter().copied().chain(interrupted)
+    }
+
     /// Cuts clips from these crops.
     fn clips(&self, crops: &[PersonCrop]) -> Vec<Clip> {
         let ended = self.ended.iter().filter_map(|interaction| {
@@ -288,7 +292,7 @@ impl Interactions {
                 [0, CROPS - 1, CROPS + SLACK - 1].map(|k| Some(crops.get(first + k)?.frame));
             let [Some(start), Some(end), Some(last)] = frames else { return None };
             let mut is_mixed = false;
-            for interaction in &self.ended {
+            for interaction in self.all() {
                 let is_disjoint = interaction.end < start || interaction.started > last;
                 let is_recent =
                     (end.saturating_sub(RECENT_FRAMES)..=last).contains(&interaction.end);
@@ -303,13 +307,62 @@ impl Interactions {
     }
 }
 
-/// Returns the clip that starts at this crop, if it has no gap and shows the person.
+/// Returns the clip that starts at this crop, if it has no gap and every input that it contains shows the
+/// person.
 fn clip_at(crops: &[PersonCrop], first: usize, label: Behavior, is_mixed: bool) -> Option<Clip> {
     let crops = crops.get(first..first + CROPS + SLACK)?;
     let is_contiguous =
         crops.windows(2).all(|pair| pair[1].frame == pair[0].frame + HISTORY.every_frames);
-    let n_seen = crops[..CROPS].iter().filter(|crop| crop.is_seen).count();
-    let is_seen = n_seen as f32 >= MIN_SEEN_FRACTION * CROPS as f32;
+    let is_seen = crops.windows(CROPS).all(is_seen_enough);
     let clip = || Clip { label, is_mixed, episode: 0, crops: crops.to_vec() };
     (is_contiguous && is_seen).then(clip)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::behavior::crop::SIDE;
+
+    /// Successive crops; those of these indices show the person.
+    fn crops(n: usize, is_seen: impl Fn(usize) -> bool) -> Vec<PersonCrop> {
+        let crop = |k: usize| PersonCrop {
+            frame: HISTORY.every_frames * k as Frame,
+            distance_m: 2.0,
+            speed: None,
+            is_seen: is_seen(k),
+            rgb: vec![0; 3 * SIDE * SIDE],
+            depth: vec![0; SIDE * SIDE],
+        };
+        (0..n).map(crop).collect()
+    }
+
+    #[test]
+    fn an_action_that_the_end_of_the_episode_interrupts_still_runs() {
+        let crops = crops(150, |_| true);
+        let mut interactions = Interactions::default();
+        let is_mixed = |interactions: &Interactions| -> Vec<bool> {
+            interactions.clips(&crops).iter().map(|clip| clip.is_mixed).collect()
+        };
+        assert_eq!(is_mixed(&interactions), [false; 5]);
+        // Clips start at frames 0, 72, ... and end 105 frames later.
+        interactions.started = Some(178);
+        assert_eq!(is_mixed(&interactions), [false, false, true, true, true]);
+        let ended = Interaction { started: 178, end: 420, behavior: Some(Behavior::PutIn) };
+        let interactions = Interactions { ended: vec![ended], started: None };
+        assert_eq!(is_mixed(&interactions), [false, false, false, true, true, true]);
+        assert_eq!(interactions.clips(&crops)[0].label, Behavior::PutIn);
+    }
+
+    #[test]
+    fn every_input_of_a_clip_shows_the_person() {
+        let label = Behavior::Moving;
+        let n = CROPS + SLACK;
+        let n_seen = 7;
+        for first in 0..n - n_seen {
+            let crops = crops(n, |k| (first..first + n_seen).contains(&k));
+            // The inputs have all crops but up to four at the start and at the end.
+            let are_common = (SLACK..=CROPS - n_seen).contains(&first);
+            assert_eq!(clip_at(&crops, 0, label, false).is_some(), are_common, "from {first}");
+        }
+    }
 }

@@ -18,8 +18,17 @@ pub const HISTORY: FrameHistorySpec =
 const MIN_DISTANCE_M: f32 = 0.5;
 /// Quantization step of stored depth relative to the person, meters.
 const DEPTH_STEP_M: f32 = 0.0125;
-/// Maximum age of a sighting that determines crops, frames: 1.5 s (ours).
+/// Maximum time between a sighting and an image that it alone places a crop in, frames: 1.5 s (ours).
 const MAX_AGE_FRAMES: Frame = 45;
+/// Maximum distance of a body's points from the vertical axis through the person's place, meters: arms
+/// reach further, and the place has an error of up to 0.25 m.
+const BODY_RADIUS_M: f32 = 0.4;
+/// Minimum height of a body's points that count, meters; lower ones may be the floor.
+const MIN_BODY_HEIGHT_M: f32 = 0.3;
+/// Minimum number of a body's pixels in a crop that shows the person: 0.05 square meters, about a tenth of
+/// an adult. Of crops between two sightings 96 % have as many, of those at a place where the person was
+/// not detected 9 % (16 validation episodes with ground-truth ids).
+const MIN_BODY_PIXELS: usize = 20;
 /// Displacement that crops ignore, meters. Positions are means over masks, which vary from image to
 /// image and with the arms. Nearly all errors of the bundled detector are smaller.
 pub const SLACK_M: f32 = 0.1;
@@ -31,10 +40,11 @@ pub struct PersonCrop {
     pub frame: Frame,
     /// Distance along the camera's axis, meters; 0 if the person is not visible.
     pub distance_m: f32,
-    /// Horizontal speed, meters per frame.
-    pub speed: f32,
-    /// True if the helper detected the person when it received the image. Other crops show the place where
-    /// the person is assumed to be.
+    /// Horizontal speed between the sightings before and after the image, meters per frame; `None` if one
+    /// of them is missing.
+    pub speed: Option<f32>,
+    /// True if the image shows a body at the person's place. Otherwise the person is hidden, or not where it
+    /// is assumed to be.
     pub is_seen: bool,
     /// Color, shape [`SIDE`, `SIDE`, 3]; empty if the person is not visible.
     pub rgb: Vec<u8>,
@@ -48,7 +58,7 @@ impl PersonCrop {
         PersonCrop {
             frame,
             distance_m: 0.0,
-            speed: 0.0,
+            speed: None,
             is_seen: false,
             rgb: Vec::new(),
             depth: Vec::new(),
@@ -65,8 +75,18 @@ impl PersonCrop {
         (f32::from(depth) - 128.0) * DEPTH_STEP_M
     }
 
-    /// Crops the person at this position, who moves at this speed and is not seen.
-    pub fn new(image: &HistoryFrame, position_in_world: Vec3, speed: f32) -> PersonCrop {
+    /// Returns the offsets of a pixel's point to the right of and above the crop's center, meters, given its
+    /// distance behind the person.
+    pub fn offsets_m(&self, column: usize, row: usize, behind_m: f32) -> [f32; 2] {
+        const STEP_M: f32 = WINDOW_M / SIDE as f32;
+        let scale = STEP_M * (1.0 + behind_m / self.distance_m);
+        let lateral_m = (column as f32 + 0.5 - 0.5 * SIDE as f32) * scale;
+        let above_m = (0.5 * SIDE as f32 - row as f32 - 0.5) * scale;
+        [lateral_m, above_m]
+    }
+
+    /// Crops the person at this position, who moves at this speed.
+    pub fn new(image: &HistoryFrame, position_in_world: Vec3, speed: Option<f32>) -> PersonCrop {
         let HistoryFrame { frame, camera, images } = image;
         let blank = PersonCrop::blank(*frame);
         let (Some(rgb), Some(depth_m)) = (&images.rgb, &images.depth_m) else { return blank };
@@ -95,7 +115,21 @@ impl PersonCrop {
                 crop.depth[target] = (relative_depth + 128.0).clamp(1.0, 255.0) as u8;
             }
         }
+        crop.is_seen = crop.n_body_pixels() >= MIN_BODY_PIXELS;
         crop
+    }
+
+    /// Returns the number of pixels that show a body at the person's place.
+    fn n_body_pixels(&self) -> usize {
+        let is_body = |(k, depth): &(usize, &u8)| {
+            let behind_m = PersonCrop::behind_m(**depth);
+            let [lateral_m, above_m] = self.offsets_m(k % SIDE, k / SIDE, behind_m);
+            let squared_m2 = lateral_m * lateral_m + behind_m * behind_m;
+            **depth != 0
+                && squared_m2 < BODY_RADIUS_M * BODY_RADIUS_M
+                && CENTER_HEIGHT_M + above_m > MIN_BODY_HEIGHT_M
+        };
+        self.depth.iter().enumerate().filter(is_body).count()
     }
 }
 
@@ -109,8 +143,6 @@ fn pixel(at: f32, n: usize) -> Option<usize> {
 struct Sighting {
     frame: Frame,
     position_in_world: Vec3,
-    /// Horizontal speed up to this sighting, meters per frame.
-    speed: f32,
 }
 
 impl Sighting {
@@ -119,6 +151,11 @@ impl Sighting {
         let displacement_m = horizontal_distance(self.position_in_world, at);
         let fraction = (displacement_m - SLACK_M).max(0.0) / displacement_m.max(SLACK_M);
         self.position_in_world + fraction * (at - self.position_in_world)
+    }
+
+    /// Returns whether the person is assumed to stand at this place in another frame, earlier or later.
+    fn is_near(&self, frame: Frame) -> bool {
+        self.frame.abs_diff(frame) < MAX_AGE_FRAMES
     }
 }
 
@@ -136,46 +173,38 @@ pub struct PersonCropper {
 impl PersonCropper {
     /// Returns a crop of each image since the last observation, given the person's position if visible
     /// `now`. Positions between two sightings are interpolated linearly, also during a long action of the
-    /// helper. After the last sighting the person is assumed to stand still for a while, since detectors
-    /// miss people in single images.
+    /// helper. The person is assumed to stand still for a while after a sighting, since detectors miss people
+    /// in single images, and before the first one.
     pub fn crop(
         &mut self,
         now: Frame,
         images: &[HistoryFrame],
         position_in_world: Option<Vec3>,
     ) -> Vec<PersonCrop> {
-        let is_recent = |last: &Sighting, frame: Frame| last.frame + MAX_AGE_FRAMES > frame;
         let start = images.first().map_or(now, |image| image.frame);
-        let previous = self.last.filter(|last| is_recent(last, start));
-        let current = position_in_world.map(|at| match previous {
-            Some(previous) => previous.follow(at),
-            None => at,
+        let before = self.last.filter(|last| last.is_near(start));
+        let after = position_in_world.map(|at| {
+            let position_in_world = before.map_or(at, |before| before.follow(at));
+            Sighting { frame: now, position_in_world }
         });
-        let speed = match (previous, current) {
-            (Some(previous), Some(to)) if previous.frame < now => {
-                horizontal_distance(previous.position_in_world, to) / (now - previous.frame) as f32
+        self.last = after.or(self.last);
+        // The person's position, and its speed if known.
+        let place_at = |frame: Frame| match (before, after) {
+            (Some(before), Some(after)) if before.frame < now => {
+                let (from, to) = (before.position_in_world, after.position_in_world);
+                let n_frames = (now - before.frame) as f32;
+                let fraction = (frame.saturating_sub(before.frame) as f32 / n_frames).min(1.0);
+                let speed = horizontal_distance(from, to) / n_frames;
+                Some((from + fraction * (to - from), Some(speed)))
             }
-            (Some(previous), _) => previous.speed,
-            (None, _) => 0.0,
-        };
-        if let Some(position_in_world) = current {
-            self.last = Some(Sighting { frame: now, position_in_world, speed });
-        }
-        let at = |frame: Frame| match (previous, current) {
-            (Some(previous), Some(to)) if previous.frame < now => {
-                let from = previous.position_in_world;
-                let elapsed = frame.saturating_sub(previous.frame) as f32;
-                let fraction = elapsed / (now - previous.frame) as f32;
-                Some(from + fraction.min(1.0) * (to - from))
+            _ => {
+                let only = after.or(before).filter(|sighting| sighting.is_near(frame));
+                only.map(|sighting| (sighting.position_in_world, None))
             }
-            (_, Some(to)) => Some(to),
-            (Some(last), None) => is_recent(&last, frame).then_some(last.position_in_world),
-            (None, None) => None,
         };
-        let crop = |image: &HistoryFrame| {
-            let Some(at) = at(image.frame) else { return PersonCrop::blank(image.frame) };
-            let crop = PersonCrop::new(image, at, speed);
-            PersonCrop { is_seen: position_in_world.is_some() && !crop.is_blank(), ..crop }
+        let crop = |image: &HistoryFrame| match place_at(image.frame) {
+            Some((at, speed)) => PersonCrop::new(image, at, speed),
+            None => PersonCrop::blank(image.frame),
         };
         images.iter().map(crop).collect()
     }

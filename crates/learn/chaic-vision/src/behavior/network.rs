@@ -6,6 +6,7 @@ use chaic_nn::weights::WeightsError;
 use chaic_nn::{Kernel, Network, Node, Pass, Shape, Tensor, weights};
 
 use super::Behavior;
+use super::calibration::Calibration;
 use super::clip::{CROPS, ClipAugmentation, N_CHANNELS, fill_input};
 use super::crop::{PersonCrop, SIDE};
 
@@ -69,24 +70,25 @@ impl BehaviorNetwork {
     }
 }
 
-/// Trained network with its temperature.
+/// Trained network with its calibration.
 #[derive(Clone, Debug)]
 pub struct TrainedBehavior {
     /// The network.
     pub network: BehaviorNetwork,
     /// Parameters of the network.
     pub parameters: Vec<f32>,
-    /// Factor of the logits before softmax (temperature scaling, Guo et al. 2017).
-    pub inverse_temperature: f32,
+    /// Calibration of its probabilities.
+    pub calibration: Calibration,
 }
 
 /// Kind in weights files.
-const KIND: &str = "chaic behavior 3";
+const KIND: &str = "chaic behavior 4";
 
-/// Returns the network together with the temperature of the file.
+/// Returns the network together with the calibration of the file.
 fn file_layout(network: &BehaviorNetwork) -> Network {
     let mut network = network.network.clone();
-    network.extra_parameters("sharpness", 1);
+    network.extra_parameters("inverse_temperature", 1);
+    network.extra_parameters("class_bias", Behavior::ALL.len());
     network
 }
 
@@ -104,8 +106,12 @@ impl TrainedBehavior {
     pub fn from_bytes(bytes: &[u8]) -> Result<TrainedBehavior, WeightsError> {
         let network = BehaviorNetwork::new();
         let mut parameters = weights::from_bytes(&file_layout(&network), bytes, KIND)?;
-        let inverse_temperature = parameters.pop().unwrap_or(1.0);
-        Ok(TrainedBehavior { network, parameters, inverse_temperature })
+        let extra = parameters.split_off(network.network.n_parameters());
+        let calibration = Calibration {
+            inverse_temperature: extra[0],
+            class_bias: std::array::from_fn(|k| extra[1 + k]),
+        };
+        Ok(TrainedBehavior { network, parameters, calibration })
     }
 
     /// Writes a safetensors file.
@@ -117,7 +123,8 @@ impl TrainedBehavior {
     }
 
     fn all_parameters(&self) -> Vec<f32> {
-        self.parameters.iter().chain([&self.inverse_temperature]).copied().collect()
+        let Calibration { inverse_temperature, class_bias } = &self.calibration;
+        self.parameters.iter().chain([inverse_temperature]).chain(class_bias).copied().collect()
     }
 
     /// Returns the digest of the weights file, twelve hexadecimal digits.
@@ -139,9 +146,9 @@ impl TrainedBehavior {
         std::array::from_fn(|k| logits[k])
     }
 
-    /// Returns the probability of each behavior.
+    /// Returns the probability of each behavior in clips that are as frequent as helpers see them.
     pub fn probabilities(&self, logits: &BehaviorScores) -> BehaviorScores {
-        softmax(&logits.map(|x| self.inverse_temperature * x))
+        self.calibration.probabilities(logits)
     }
 }
 

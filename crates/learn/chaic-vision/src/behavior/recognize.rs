@@ -17,7 +17,7 @@ use chaic_core::{Action, AgentId, FailureReason, Frame, Hand, Observation, Outco
 use chaic_nn::Pass;
 
 use super::Behavior;
-use super::clip::{CROPS, SLACK};
+use super::clip::{CROPS, SLACK, is_seen_enough};
 use super::crop::{HISTORY, PersonCrop, PersonCropper, visible_position};
 use super::network::TrainedBehavior;
 use super::report::most_probable;
@@ -27,8 +27,6 @@ use super::report::most_probable;
 pub struct RecognizerConfig {
     /// Minimum probability of a reported behavior (original: 0.6).
     pub min_confidence: f32,
-    /// Minimum fraction of a clip's crops that show the person.
-    pub min_seen_fraction: f32,
     /// Frames within which a behavior is not reported again, since clips overlap.
     pub refractory_frames: Frame,
     /// Maximum horizontal distance between the person and the object of an action, meters.
@@ -37,12 +35,7 @@ pub struct RecognizerConfig {
 
 impl Default for RecognizerConfig {
     fn default() -> RecognizerConfig {
-        RecognizerConfig {
-            min_confidence: 0.6,
-            min_seen_fraction: 0.2,
-            refractory_frames: 45,
-            reach_m: 2.0,
-        }
+        RecognizerConfig { min_confidence: 0.6, refractory_frames: 45, reach_m: 2.0 }
     }
 }
 
@@ -148,8 +141,7 @@ impl LearnedBehavior {
             return None;
         }
         self.n_new = 0;
-        let n_seen = self.crops.iter().filter(|crop| crop.is_seen).count();
-        if (n_seen as f32) < self.config.min_seen_fraction * CROPS as f32 {
+        if !is_seen_enough(&self.crops) {
             return None;
         }
         let outputs = self.model.outputs(self.crops.make_contiguous(), 0, &mut self.pass);

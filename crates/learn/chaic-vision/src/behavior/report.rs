@@ -6,8 +6,9 @@ use std::sync::atomic::AtomicBool;
 use serde::Serialize;
 
 use super::Behavior;
-use super::clip::{Clip, SLACK};
-use super::network::{BehaviorScores, TrainedBehavior, softmax};
+use super::clip::{Clip, ClipSet, SLACK};
+use super::network::{BehaviorScores, TrainedBehavior};
+use crate::calibration::weighted_calibration_error;
 use crate::parallel::map_in_order;
 use crate::track_evaluation::Rate;
 
@@ -24,9 +25,13 @@ pub struct BehaviorReport {
     pub top1: Option<f64>,
     /// Half width of the 95 % interval of `top1` over episodes; `None` with fewer than two.
     pub interval: Option<f64>,
+    /// Fraction of correctly classified clips, mixed ones included, if each kind is as frequent as in play;
+    /// `None` without clips.
+    pub top1_in_play: Option<f64>,
     /// Mean recall over the behaviors that occur; `None` without clips.
     pub balanced: Option<f64>,
-    /// Expected calibration error over ten bins; `None` without clips.
+    /// Expected calibration error over ten bins, with the clips and frequencies of `top1_in_play`; `None`
+    /// without clips.
     pub calibration_error: Option<f64>,
     /// Fraction of mixed clips that are classified as moving; `None` without mixed clips.
     pub mixed_as_moving: Option<f64>,
@@ -61,19 +66,37 @@ pub fn most_probable(probabilities: &BehaviorScores) -> (Behavior, f32) {
 /// Evaluates a network on clips; returns `None` if `stop` is set meanwhile.
 pub fn report(
     trained: &TrainedBehavior,
-    clips: &[Clip],
+    clips: &ClipSet,
     n_threads: usize,
     stop: &AtomicBool,
 ) -> Option<BehaviorReport> {
-    let outputs = all_outputs(trained, clips, n_threads, stop)?;
+    let outputs = all_outputs(trained, &clips.clips, n_threads, stop)?;
+    Some(report_of_outputs(trained, clips, &outputs))
+}
+
+/// Evaluates the logits of clips.
+pub fn report_of_outputs(
+    trained: &TrainedBehavior,
+    set: &ClipSet,
+    outputs: &[BehaviorScores],
+) -> BehaviorReport {
+    let clips = &set.clips;
     let predictions: Vec<(Behavior, f32)> =
         outputs.iter().map(|o| most_probable(&trained.probabilities(o))).collect();
+    let scored: Vec<(f32, bool, f64)> = clips
+        .iter()
+        .zip(&predictions)
+        .zip(set.weights())
+        .map(|((clip, (behavior, p)), weight)| (*p, *behavior == clip.label, weight))
+        .collect();
+    let total: f64 = scored.iter().map(|(_, _, weight)| weight).sum();
+    let correct: f64 = scored.iter().filter(|(_, is_correct, _)| *is_correct).map(|s| s.2).sum();
+    let has_weights = total > 0.0;
     let mut counts = [[0usize; N]; N];
-    let mut scored = Vec::new();
     // Correct and all clips of each episode.
     let mut by_episode: BTreeMap<u32, [usize; 2]> = BTreeMap::new();
     let mut mixed = [0usize; 2];
-    for (clip, (behavior, probability)) in clips.iter().zip(predictions) {
+    for (clip, (behavior, _)) in clips.iter().zip(predictions) {
         if clip.is_mixed {
             mixed[0] += usize::from(behavior == Behavior::Moving);
             mixed[1] += 1;
@@ -81,7 +104,6 @@ pub fn report(
         }
         let is_correct = behavior == clip.label;
         counts[clip.label.index()][behavior.index()] += 1;
-        scored.push((probability, is_correct));
         let episode = by_episode.entry(clip.episode).or_default();
         episode[0] += usize::from(is_correct);
         episode[1] += 1;
@@ -90,41 +112,20 @@ pub fn report(
     let rows = counts.iter().enumerate().filter(|(_, row)| row.iter().sum::<usize>() > 0);
     let recalls: Vec<f64> =
         rows.map(|(k, row)| row[k] as f64 / row.iter().sum::<usize>() as f64).collect();
-    let has_clips = !scored.is_empty();
     let counts_by_name =
         |row: &[usize; N]| Behavior::ALL.map(Behavior::name).into_iter().zip(*row).collect();
-    Some(BehaviorReport {
-        clips: scored.len(),
+    BehaviorReport {
+        clips: top1.n,
         episodes: by_episode.len(),
         top1: top1.value,
         interval: top1.interval,
-        balanced: has_clips.then(|| recalls.iter().sum::<f64>() / recalls.len() as f64),
-        calibration_error: has_clips.then(|| crate::calibration::calibration_error(&scored)),
+        top1_in_play: has_weights.then(|| correct / total),
+        balanced: (top1.n > 0).then(|| recalls.iter().sum::<f64>() / recalls.len() as f64),
+        calibration_error: has_weights.then(|| weighted_calibration_error(&scored)),
         mixed_as_moving: Rate::new(std::iter::once(mixed)).value,
         confusion: Behavior::ALL
             .iter()
             .map(|b| (b.name(), counts_by_name(&counts[b.index()])))
             .collect(),
-    })
-}
-
-/// Returns the inverse temperature that maximizes the likelihood of the labels, by golden-section
-/// search; 1 if all clips are mixed or there are none.
-pub fn calibrate(clips: &[Clip], outputs: &[BehaviorScores]) -> f32 {
-    if clips.iter().all(|clip| clip.is_mixed) {
-        return 1.0;
     }
-    let loss = |inverse_temperature: f32| -> f64 {
-        let clip_loss = |(clip, o): (&Clip, &BehaviorScores)| {
-            let p = softmax(&o.map(|x| inverse_temperature * x))[clip.label.index()];
-            -f64::from(crate::loss::ln(p.max(1e-6)))
-        };
-        clips.iter().zip(outputs).filter(|(clip, _)| !clip.is_mixed).map(clip_loss).sum()
-    };
-    let (mut low, mut high) = (0.1f32, 4.0f32);
-    for _ in 0..30 {
-        let (a, b) = (low + 0.382 * (high - low), low + 0.618 * (high - low));
-        if loss(a) < loss(b) { high = b } else { low = a }
-    }
-    0.5 * (low + high)
 }

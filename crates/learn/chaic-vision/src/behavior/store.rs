@@ -10,7 +10,7 @@ use chaic_files::{FileError, create_folders, read_bounded, write_atomically};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
 
 use super::Behavior;
-use super::clip::{CROPS, Clip, SLACK};
+use super::clip::{CROPS, Clip, ClipSet, Counts, SLACK};
 use super::config::ClipCollectionConfig;
 use super::crop::{PersonCrop, SIDE};
 use crate::views::DatasetSplit;
@@ -18,12 +18,16 @@ use crate::views::DatasetSplit;
 /// File of the collection's configuration.
 const CONFIG: &str = "rules.toml";
 /// Version of the clips: increased when the meaning of a crop changes.
-const CLIPS_VERSION: i64 = 3;
+const CLIPS_VERSION: i64 = 4;
 /// Maximum size of a file, bytes.
 const MAX_BYTES: u64 = 1 << 30;
 /// Crops of a clip.
 const N_CROPS: usize = CROPS + SLACK;
 const N_PIXELS: usize = SIDE * SIDE;
+/// Tensor with the number of clips of each kind that the episodes gave, u32.
+const FOUND: &str = "found";
+/// Value in a file for an unknown speed.
+const UNKNOWN_SPEED: f32 = -1.0;
 
 /// Error of a clip folder.
 #[derive(Debug, thiserror::Error)]
@@ -129,22 +133,22 @@ impl ClipFolder {
     ///
     /// # Errors
     /// If the file cannot be read.
-    pub fn read(&self, first_episode: usize) -> Result<Option<Vec<Clip>>, StoreError> {
+    pub fn read(&self, first_episode: usize) -> Result<Option<ClipSet>, StoreError> {
         let path = self.path(first_episode);
         if !path.exists() {
             return Ok(None);
         }
         let bytes = read_bounded(&path, MAX_BYTES)?;
-        let clips = from_bytes(&bytes);
-        clips.map(Some).map_err(|problem| StoreError::Format { path, problem })
+        let round = from_bytes(&bytes);
+        round.map(Some).map_err(|problem| StoreError::Format { path, problem })
     }
 
     /// Writes the clips of a round.
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn write(&self, first_episode: usize, clips: &[Clip]) -> Result<(), StoreError> {
-        Ok(write_atomically(&self.path(first_episode), &to_bytes(clips))?)
+    pub fn write(&self, first_episode: usize, round: &ClipSet) -> Result<(), StoreError> {
+        Ok(write_atomically(&self.path(first_episode), &to_bytes(round))?)
     }
 }
 
@@ -179,7 +183,7 @@ const TENSORS: [(&str, Dtype, &[usize]); 9] = [
 ];
 
 /// Serializes clips as safetensors; crops without a person are black, at distance 0.
-pub fn to_bytes(clips: &[Clip]) -> Vec<u8> {
+pub fn to_bytes(ClipSet { clips, found }: &ClipSet) -> Vec<u8> {
     let crop_values = |value: &dyn Fn(&PersonCrop) -> [u8; 4]| -> Vec<u8> {
         clips.iter().flat_map(|clip| clip.crops.iter().flat_map(value)).collect()
     };
@@ -199,7 +203,7 @@ pub fn to_bytes(clips: &[Clip]) -> Vec<u8> {
         clips.iter().map(|clip| u8::from(clip.is_mixed)).collect(),
         crop_values(&|crop| crop.frame.to_le_bytes()),
         crop_values(&|crop| crop.distance_m.to_le_bytes()),
-        crop_values(&|crop| crop.speed.to_le_bytes()),
+        crop_values(&|crop| crop.speed.unwrap_or(UNKNOWN_SPEED).to_le_bytes()),
         images(|crop| &crop.rgb, 3 * N_PIXELS),
         images(|crop| &crop.depth, N_PIXELS),
         clips.iter().flat_map(|clip| &clip.crops).map(|crop| u8::from(crop.is_seen)).collect(),
@@ -210,11 +214,15 @@ pub fn to_bytes(clips: &[Clip]) -> Vec<u8> {
         let view = TensorView::new(*dtype, shape, bytes);
         ((*name).to_owned(), view.expect("the length matches the shape"))
     });
+    let found: Vec<u8> = found.iter().flat_map(|n| (*n as u32).to_le_bytes()).collect();
+    let found_view = TensorView::new(Dtype::U32, vec![Counts::default().len()], &found);
+    let found_view = found_view.expect("the length matches the shape");
+    let views = views.chain([(FOUND.to_owned(), found_view)]);
     serialize(views, None).expect("names are unique and shapes fit")
 }
 
 /// Parses a file of clips; the error names the fault.
-fn from_bytes(bytes: &[u8]) -> Result<Vec<Clip>, String> {
+fn from_bytes(bytes: &[u8]) -> Result<ClipSet, String> {
     let file = SafeTensors::deserialize(bytes).map_err(|e| e.to_string())?;
     let n = file.tensor("label").map_err(|e| e.to_string())?.shape().first().copied();
     let n = n.unwrap_or(0);
@@ -226,6 +234,14 @@ fn from_bytes(bytes: &[u8]) -> Result<Vec<Clip>, String> {
             return Err(format!("{name} is not {dtype:?} {shape:?}"));
         }
         columns.push(tensor.data());
+    }
+    let found_tensor = file.tensor(FOUND).map_err(|e| e.to_string())?;
+    let mut found = Counts::default();
+    if found_tensor.dtype() != Dtype::U32 || found_tensor.shape() != [found.len()] {
+        return Err(format!("{FOUND} is not {:?} {:?}", Dtype::U32, [found.len()]));
+    }
+    for (n, bytes) in found.iter_mut().zip(found_tensor.data().as_chunks::<4>().0) {
+        *n = u32::from_le_bytes(*bytes) as usize;
     }
     let bytes_at = |column: usize, k: usize| -> [u8; 4] {
         std::array::from_fn(|byte| columns[column][4 * k + byte])
@@ -242,7 +258,7 @@ fn from_bytes(bytes: &[u8]) -> Result<Vec<Clip>, String> {
             false => PersonCrop {
                 frame,
                 distance_m,
-                speed,
+                speed: (speed >= 0.0).then_some(speed),
                 is_seen: columns[7][k] != 0,
                 rgb: image(5, 3 * N_PIXELS),
                 depth: image(6, N_PIXELS),
@@ -256,7 +272,12 @@ fn from_bytes(bytes: &[u8]) -> Result<Vec<Clip>, String> {
         let (is_mixed, episode) = (columns[1][k] != 0, u32::from_le_bytes(bytes_at(8, k)));
         Ok(Clip { label: *label, is_mixed, episode, crops: crops? })
     };
-    (0..n).map(clip).collect()
+    let clips = (0..n).map(clip).collect::<Result<Vec<Clip>, String>>()?;
+    let round = ClipSet::new(clips);
+    if round.found.iter().zip(found).any(|(kept, found)| *kept > found) {
+        return Err(format!("{FOUND} is less than the number of clips"));
+    }
+    Ok(ClipSet { found, ..round })
 }
 
 #[cfg(test)]
@@ -272,7 +293,7 @@ mod tests {
         let visible = |frame| PersonCrop {
             frame,
             distance_m: 2.5,
-            speed: 0.01,
+            speed: (frame % 4 == 0).then_some(0.01),
             is_seen: frame % 3 == 0,
             rgb: (0..3 * N_PIXELS).map(|k| (k % 251) as u8).collect(),
             depth: vec![7; N_PIXELS],
@@ -296,12 +317,14 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let config = ClipCollectionConfig::default();
         let folder = open(dir.path(), DatasetSplit::Train, &config).unwrap();
-        let clips = vec![clip(Behavior::PutIn, 5), clip(Behavior::Moving, 90)];
-        folder.write(16, &clips).unwrap();
-        assert!(folder.read(16).unwrap() == Some(clips));
+        let mut round = ClipSet::new(vec![clip(Behavior::PutIn, 5), clip(Behavior::Moving, 90)]);
+        // Clips that were not kept.
+        round.found[Behavior::Moving.index()] += 70_000;
+        folder.write(16, &round).unwrap();
+        assert!(folder.read(16).unwrap() == Some(round));
         assert!(folder.read(0).unwrap().is_none());
-        folder.write(32, &[]).unwrap();
-        assert!(folder.read(32).unwrap() == Some(Vec::new()));
+        folder.write(32, &ClipSet::default()).unwrap();
+        assert!(folder.read(32).unwrap() == Some(ClipSet::default()));
     }
 
     #[test]
@@ -322,7 +345,7 @@ mod tests {
         open(dir.path(), DatasetSplit::Train, &config).unwrap();
         let text = fs::read_to_string(dir.path().join(CONFIG)).unwrap();
         let version = format!("clips_version = {CLIPS_VERSION}\n");
-        for other in ["", "clips_version = 2\n"] {
+        for other in ["", "clips_version = 3\n"] {
             fs::write(dir.path().join(CONFIG), text.replace(&version, other)).unwrap();
             let opened = open(dir.path(), DatasetSplit::Train, &config);
             assert!(matches!(opened, Err(StoreError::Config(_))), "{other}");
@@ -340,7 +363,12 @@ mod tests {
         let refused = open(dir.path(), DatasetSplit::Train, &other_config).unwrap_err();
         assert!(refused.to_string().contains("of another configuration"), "{refused}");
         assert!(open(dir.path(), DatasetSplit::Test, &config).is_err());
-        let bytes = to_bytes(&[clip(Behavior::PutOn, 0)]);
+        let round = ClipSet::new(vec![clip(Behavior::PutOn, 0)]);
+        let fewer = ClipSet { found: Counts::default(), ..round.clone() };
+        fs::write(folder.path(0), to_bytes(&fewer)).unwrap();
+        let error = folder.read(0).unwrap_err().to_string();
+        assert!(error.contains("found"), "{error}");
+        let bytes = to_bytes(&round);
         for length in [0, 7, 100, bytes.len() - 1] {
             fs::write(folder.path(0), &bytes[..length]).unwrap();
             let error = folder.read(0).unwrap_err().to_string();

@@ -18,11 +18,12 @@ use serde::{Deserialize, Serialize};
 use chaic_agents::perception_factory::GroundTruthPerceptionFactory;
 
 use super::Behavior;
-use super::clip::{Clip, ClipAugmentation, fill_input};
-use super::collect::{Collector, Counts, collect};
+use super::calibration::Calibration;
+use super::clip::{Clip, ClipAugmentation, ClipSet, Counts, MIXED, fill_input};
+use super::collect::{Collector, collect};
 use super::config::{COLLECT_BOUNDS, ClipCollectionConfig};
 use super::network::{BehaviorNetwork, BehaviorScores, TrainedBehavior, softmax};
-use super::report::{all_outputs, calibrate, report};
+use super::report::{all_outputs, report_of_outputs};
 use super::store::{ClipFolder, StoreError};
 use crate::loss::ln;
 use crate::views::DatasetSplit;
@@ -48,7 +49,8 @@ pub struct BehaviorTrainingConfig {
     /// Clips per shard.
     #[serde(alias = "clips")]
     pub batch_size: usize,
-    /// Fraction of mixed clips among clips of moving people.
+    /// Fraction of mixed clips among clips of moving people, best as in play: 175 of 422 clips of 16 episodes
+    /// (`chaic collect behavior --split validation --max-per-class 5000 --n-episodes 16`).
     #[serde(alias = "mixed")]
     pub mixed_fraction: f32,
     /// Label smoothing (Szegedy et al. 2016).
@@ -70,7 +72,7 @@ impl Default for BehaviorTrainingConfig {
             warm_up: 100,
             shards: 2,
             batch_size: 8,
-            mixed_fraction: 0.7,
+            mixed_fraction: 0.4,
             label_smoothing: 0.05,
             collect: ClipCollectionConfig::default(),
             adam: AdamWConfig { weight_decay: 0.05, ..AdamWConfig::default() },
@@ -87,8 +89,11 @@ pub struct BehaviorLearner {
     /// Parameters and optimizer.
     pub learner: Learner,
     /// Clips of each behavior; mixed clips are last.
-    clips: [Vec<Clip>; Behavior::ALL.len() + 1],
+    clips: ClipsByKind,
 }
+
+/// Clips of each behavior; mixed clips are last.
+type ClipsByKind = [Vec<Clip>; MIXED + 1];
 
 /// Metrics of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -104,10 +109,9 @@ impl BehaviorLearner {
     pub fn new(config: BehaviorTrainingConfig, clips: Vec<Clip>) -> BehaviorLearner {
         let network = BehaviorNetwork::new();
         let learner = Learner::new(&network.network, config.seed, config.shards);
-        let mut clips_by_kind: [Vec<Clip>; Behavior::ALL.len() + 1] = Default::default();
+        let mut clips_by_kind = ClipsByKind::default();
         for clip in clips {
-            let kind = if clip.is_mixed { Behavior::ALL.len() } else { clip.label.index() };
-            clips_by_kind[kind].push(clip);
+            clips_by_kind[clip.kind()].push(clip);
         }
         BehaviorLearner { config, network, learner, clips: clips_by_kind }
     }
@@ -115,7 +119,15 @@ impl BehaviorLearner {
     /// Returns the network with the exponential moving average of its parameters.
     pub fn trained(&self) -> TrainedBehavior {
         let parameters = self.learner.ema_parameters.clone();
-        TrainedBehavior { network: self.network.clone(), parameters, inverse_temperature: 1.0 }
+        let calibration = Calibration::default();
+        TrainedBehavior { network: self.network.clone(), parameters, calibration }
+    }
+
+    /// Returns the expected fraction of each behavior in batches.
+    pub fn batch_fractions(&self) -> BehaviorScores {
+        let drawn = drawn_behaviors(&self.clips);
+        let n_drawn = |k: usize| drawn.iter().filter(|behavior| **behavior == k).count();
+        std::array::from_fn(|k| n_drawn(k) as f32 / drawn.len().max(1) as f32)
     }
 
     /// Trains on one batch, which depends on the seed and the step only.
@@ -155,8 +167,8 @@ impl BehaviorLearner {
     }
 }
 
-/// Maximum number of validation clips of each behavior.
-const VALIDATION_CLIPS: usize = 60;
+/// Maximum number of validation clips of each behavior, and of mixed clips.
+const VALIDATION_CLIPS: usize = 200;
 /// Ratio of training episodes to validation episodes.
 const TRAINING_EPISODES_PER_VALIDATION: usize = 4;
 
@@ -169,7 +181,7 @@ const MAX_SHARD_CLIPS: i64 = 64;
 /// Behavior training with validation clips.
 pub struct BehaviorTrainer {
     learner: BehaviorLearner,
-    validation: Vec<Clip>,
+    validation: ClipSet,
 }
 
 impl BehaviorTrainer {
@@ -180,7 +192,7 @@ impl BehaviorTrainer {
     pub(crate) fn with_clips(
         config: BehaviorTrainingConfig,
         training: Vec<Clip>,
-        validation: Vec<Clip>,
+        validation: ClipSet,
     ) -> Result<BehaviorTrainer, TrainingError> {
         if training.iter().all(|clip| clip.is_mixed) {
             return Err(StoreError::Empty.into());
@@ -264,7 +276,7 @@ impl Trainer for BehaviorTrainer {
         };
         let Some(validation) = clips(DatasetSplit::Validation)? else { return Ok(None) };
         let Some(training) = clips(DatasetSplit::Train)? else { return Ok(None) };
-        BehaviorTrainer::with_clips(*config, training, validation).map(Some)
+        BehaviorTrainer::with_clips(*config, training.clips, validation).map(Some)
     }
 
     fn check(config: &BehaviorTrainingConfig) -> Result<(), String> {
@@ -282,8 +294,8 @@ impl Trainer for BehaviorTrainer {
     }
 
     fn fixed_keys() -> Vec<&'static str> {
-        // The clips in the folder depend on them.
-        vec!["collect"]
+        // The clips in the folder depend on the first. Step and shard number the drawn batches.
+        vec!["collect", "shards"]
     }
 
     fn network(&self) -> &Network {
@@ -324,13 +336,14 @@ impl Trainer for BehaviorTrainer {
 
     fn validate(&self, stop: &AtomicBool) -> Result<Option<(Metrics, Vec<u8>)>, WeightsError> {
         let mut trained = self.learner.trained();
-        let outputs = all_outputs(&trained, &self.validation, THREADS, stop);
+        let outputs = all_outputs(&trained, &self.validation.clips, THREADS, stop);
         let Some(outputs) = outputs else { return Ok(None) };
-        trained.inverse_temperature = calibrate(&self.validation, &outputs);
-        let evaluation = report(&trained, &self.validation, THREADS, stop);
-        let Some(evaluation) = evaluation else { return Ok(None) };
+        let batch_fractions = self.learner.batch_fractions();
+        trained.calibration = Calibration::fit(&self.validation, &outputs, &batch_fractions);
+        let evaluation = report_of_outputs(&trained, &self.validation, &outputs);
         let metrics = defined_metrics([
             ("top1", evaluation.top1),
+            ("top1_in_play", evaluation.top1_in_play),
             ("balanced", evaluation.balanced),
             ("mixed_as_moving", evaluation.mixed_as_moving),
         ]);
@@ -338,16 +351,21 @@ impl Trainer for BehaviorTrainer {
     }
 }
 
-/// Draws a clip, uniformly over behaviors.
+/// Returns the indices of the behaviors that have clips; moving is there twice, since it has the most varied
+/// clips, plain and mixed ones.
+fn drawn_behaviors(clips: &ClipsByKind) -> Vec<usize> {
+    let moving = Behavior::Moving.index();
+    (0..Behavior::ALL.len()).chain([moving]).filter(|k| !clips[*k].is_empty()).collect()
+}
+
+/// Draws a clip, uniformly over [`drawn_behaviors`].
 fn draw_clip<'a>(
-    clips: &'a [Vec<Clip>; Behavior::ALL.len() + 1],
+    clips: &'a ClipsByKind,
     config: &BehaviorTrainingConfig,
     rng: &mut RngStream,
 ) -> Option<&'a Clip> {
-    let non_empty: Vec<usize> =
-        (0..Behavior::ALL.len()).filter(|k| !clips[*k].is_empty()).collect();
-    let kind = *rng.choose(&non_empty)?;
-    let mixed = &clips[Behavior::ALL.len()];
+    let kind = *rng.choose(&drawn_behaviors(clips))?;
+    let mixed = &clips[MIXED];
     let is_mixed = rng.chance(config.mixed_fraction) && kind == Behavior::Moving.index();
     rng.choose(if is_mixed && !mixed.is_empty() { mixed } else { &clips[kind] })
 }
@@ -375,4 +393,29 @@ fn loss(logits: &[f32], clips: &[&Clip], smoothing: f32, gradient: &mut [f32]) -
         }
     }
     metrics
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn batches_have_the_stated_fractions() {
+        let clip = |label, is_mixed| Clip { label, is_mixed, episode: 0, crops: Vec::new() };
+        let clips = vec![
+            clip(Behavior::PickedUp, false),
+            clip(Behavior::PutIn, false),
+            clip(Behavior::Moving, false),
+            clip(Behavior::Moving, true),
+        ];
+        let learner = BehaviorLearner::new(BehaviorTrainingConfig::default(), clips);
+        assert_eq!(learner.batch_fractions(), [0.25, 0.0, 0.25, 0.0, 0.0, 0.5]);
+        let mut rng = RngStream::new(1, "draws", 0);
+        let mut n = Counts::default();
+        for _ in 0..4000 {
+            n[draw_clip(&learner.clips, &learner.config, &mut rng).unwrap().kind()] += 1;
+        }
+        let expected = [1000, 0, 1000, 0, 0, 1200, 800];
+        assert!(n.iter().zip(expected).all(|(n, expected)| n.abs_diff(expected) < 120), "{n:?}");
+    }
 }

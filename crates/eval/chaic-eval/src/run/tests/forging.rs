@@ -117,7 +117,7 @@ fn rewrite_run_file(run: &Path, change: impl FnOnce(&mut RunOptions, &mut RunGra
     let (folder, mut options) = RunFolder::read(run).unwrap();
     let mut granted = folder.granted().unwrap().unwrap();
     change(&mut options, &mut granted);
-    folder.write_options(&options, &granted, None).unwrap();
+    folder.write_options(&options, &granted, None, HelperFiles::new()).unwrap();
 }
 
 /// Returns an entry of the grants in `run.json`.
@@ -407,9 +407,29 @@ const ATTACKS: &[Attack] = &[
     ("weights of another helper", Rewritten, "the weights of helpers that do not play", |run| {
         rewrite_run_file(run, |_, granted| granted.weights = entry("oracle", "0123456789ab"));
     }),
+    ("files of no helper", Rewritten, "the files of helpers that do not play", |run| {
+        let (folder, options) = RunFolder::read(run).unwrap();
+        let granted = folder.granted().unwrap().unwrap();
+        let files = HelperFiles::from([("none".to_owned(), BTreeMap::new())]);
+        folder.write_options(&options, &granted, None, files).unwrap();
+    }),
     ("grants of no helper", Rewritten, "its grants are not those of the helpers", |run| {
         rewrite_run_file(run, |_, granted| {
             granted.helpers.insert("none".to_owned(), Grants::ORACLE);
+        });
+    }),
+    ("other grants in run.json", Rewritten, "not those that such an agent requests", |run| {
+        rewrite_run_file(run, |_, granted| granted.partner = Grants::NONE);
+    }),
+    ("one trace of two helpers", Rewritten, "6 results are finished, but 4 traces", |run| {
+        rewrite_run_file(run, |options, granted| {
+            options.helpers.push("./turner".to_owned());
+            granted.helpers.insert("./turner".to_owned(), Grants::NONE);
+        });
+        change(run.join("results.jsonl"), |text| {
+            let lines = text.lines().filter(|line| line.contains("\"turner\""));
+            let copies = lines.map(|line| line.replace("\"turner\"", "\"./turner\"") + "\n");
+            text.to_owned() + &copies.collect::<String>()
         });
     }),
     ("other version in run.json", Rewritten, "OtherVersion", |run| {

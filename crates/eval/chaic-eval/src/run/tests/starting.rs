@@ -1,6 +1,8 @@
 //! Promise: a run that was stopped at its start can be started again, and files of others are not
 //! removed.
 
+use std::collections::BTreeMap;
+
 use chaic_env::partner_suite::PartnerSuite;
 
 use super::*;
@@ -257,6 +259,53 @@ fn a_helper_with_other_images_does_not_resume_a_run() {
     assert!(older.as_object_mut().unwrap().remove("images").is_some());
     fs::write(run_file("depth"), older.to_string()).unwrap();
     open("depth", FolderMode::Resume, small).unwrap();
+}
+
+#[test]
+fn a_run_is_resumed_and_merged_only_with_the_same_files_of_helpers() {
+    let source = episode_files(&[TaskId::LowTarget], 1);
+    let dir = tempfile::tempdir().unwrap();
+    let files = |digest: u64| -> HelperFiles {
+        let of_helper = BTreeMap::from([("helper.py".to_owned(), Digest(digest))]);
+        // The second plays in no run, and the last names no file.
+        let names = ["turner", "other", "breaker"];
+        let mut files: HelperFiles = names.map(|name| (name.to_owned(), of_helper.clone())).into();
+        files.get_mut("breaker").unwrap().clear();
+        files
+    };
+    let open = |name: &str, access, helper_files: HelperFiles| {
+        let request = RunRequest { helper_files, ..request(&source, &["turner", "breaker"]) };
+        Run::open(&dir.path().join(name), access, &request, &TestHelpers::new()).map(drop)
+    };
+    open("a", FolderMode::New, files(1)).unwrap();
+    open("a", FolderMode::Resume, files(1)).unwrap();
+    // A file that did not exist, such as a log of the helper, and a caller that knows no files.
+    let mut more = files(1);
+    more.get_mut("breaker").unwrap().insert("log".to_owned(), Digest(5));
+    open("a", FolderMode::Resume, more).unwrap();
+    open("a", FolderMode::Resume, HelperFiles::new()).unwrap();
+    let missing = HelperFiles::from([("turner".to_owned(), BTreeMap::new())]);
+    for changed in [files(2), missing] {
+        let error = open("a", FolderMode::Resume, changed).unwrap_err();
+        let text = error.to_string();
+        assert!(error.is_usage() && text.contains("another content of helper.py"), "{text}");
+        assert!(text.contains("which turner runs") && !text.contains('\n'), "{text}");
+    }
+    let path = |name: &str| dir.path().join(name);
+    let text = |name: &str| fs::read_to_string(path(name).join("run.json")).unwrap();
+    drop(merge(&path("merged"), &[path("a")]).unwrap());
+    assert_eq!(text("merged"), text("a"));
+    assert!(text("a").contains("\"turner\"") && !text("a").contains("\"other\""), "{}", text("a"));
+    open("b", FolderMode::New, files(2)).unwrap();
+    let error = merge(&path("mixed"), &[path("a"), path("b")]).unwrap_err();
+    assert!(error.is_usage() && error.to_string().contains("different files"), "{error}");
+    // A run of an older version records no files.
+    let mut older: serde_json::Value = serde_json::from_str(&text("a")).unwrap();
+    assert!(older.as_object_mut().unwrap().remove("files").is_some());
+    fs::write(path("a").join("run.json"), older.to_string()).unwrap();
+    open("a", FolderMode::Resume, files(2)).unwrap();
+    drop(merge(&path("both"), &[path("a"), path("b")]).unwrap());
+    assert!(!text("both").contains("\"files\""), "{}", text("both"));
 }
 
 #[test]

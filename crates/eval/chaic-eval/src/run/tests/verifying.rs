@@ -6,22 +6,27 @@ use chaic_core::AgentId;
 use chaic_env::Track;
 use chaic_env::helper_registry::BuiltInHelpers;
 use chaic_env::partner_suite::{PartnerSuite, SuitePartner};
+use chaic_env::rules::{RuleSet, RuleSetName};
 use chaic_env::trace::{Decision, Header, Participant, Record, Trace};
+use chaic_render::Appearance;
 
 use super::*;
 use crate::suite::{Robustness, SuiteFolder};
 
 /// Plays one short episode with the turner; returns the run, its trace and its folder.
 fn played_once(helpers: &TestHelpers) -> (Run, PathBuf, tempfile::TempDir) {
-    played_with(helpers, None)
+    played_with(helpers, |_| ())
 }
 
-/// Plays it with a partner of this name.
-fn played_with(helpers: &TestHelpers, partner: Option<&str>) -> (Run, PathBuf, tempfile::TempDir) {
+/// Plays it with changed options.
+fn played_with(
+    helpers: &TestHelpers,
+    change: impl FnOnce(&mut RunRequest),
+) -> (Run, PathBuf, tempfile::TempDir) {
     let files = episode_files(&[TaskId::LowTarget], 1);
     let dir = tempfile::tempdir().unwrap();
-    let partner = partner.map(str::to_owned);
-    let request = RunRequest { seeds: None, partner, ..request(&files, &["turner"]) };
+    let mut request = RunRequest { seeds: None, ..request(&files, &["turner"]) };
+    change(&mut request);
     let (mut run, _) = Run::open(dir.path(), FolderMode::New, &request, helpers).unwrap();
     assert!(play(&mut run, 1, helpers));
     let path = run.folder().traces().unwrap().remove(0);
@@ -78,6 +83,12 @@ fn verification_finds_changes() {
         fs::write(&path, &text).unwrap();
     }
     assert_eq!(report().mismatches, []);
+    // Another entry in place of the trace is one problem.
+    fs::remove_file(&path).unwrap();
+    fs::create_dir(&path).unwrap();
+    let found = report();
+    assert_eq!((found.mismatches.len(), found.findings), (1, vec![]));
+    assert!(found.mismatches[0].problem.contains("it is a folder"), "{}", found.mismatches[0]);
 }
 
 #[test]
@@ -102,11 +113,23 @@ fn an_unknown_helper_is_checked_against_the_grants_of_the_run() {
 #[test]
 fn the_partner_of_the_run_is_expected_in_traces() {
     let helpers = TestHelpers::new();
-    let (run, path, _dir) = played_with(&helpers, Some("slow"));
+    let (run, path, _dir) = played_with(&helpers, |r| r.partner = Some("slow".to_owned()));
     assert_eq!(verified(&run, &helpers), [""; 0]);
     let text = fs::read_to_string(&path).unwrap();
     fs::write(&path, text.replacen("\"slow\"", "\"fast\"", 1)).unwrap();
     assert!(verified(&run, &helpers)[0].contains("differs from the one that this run writes"));
+}
+
+#[test]
+fn rules_and_appearance_of_the_run_are_expected_in_traces() {
+    let helpers = TestHelpers::new();
+    let (run, path, _dir) = played_with(&helpers, |request| {
+        request.rules = Some(RuleSetName::Compat);
+        request.appearance = Some(Appearance::Evening);
+    });
+    let Header { rules, appearance, .. } = crate::trace_file::read(&path).unwrap().0.header;
+    assert_eq!((rules, appearance), (RuleSet::COMPAT, Appearance::Evening));
+    assert_eq!(verified(&run, &helpers), [""; 0]);
 }
 
 #[test]
@@ -523,7 +546,7 @@ fn counters_belong_to_agents_that_are_not_built_in() {
         (Some("stranger"), &["helper.calls", "partner.calls"]),
     ];
     for (partner, allowed) in runs {
-        let (run, _, _dir) = played_with(&helpers, partner);
+        let (run, _, _dir) = played_with(&helpers, |r| r.partner = partner.map(str::to_owned));
         let journal = run.folder().results();
         let line = fs::read_to_string(&journal).unwrap();
         for name in ["helper.calls", "partner.calls", "child.calls"] {

@@ -76,12 +76,12 @@ pub const ATTACKS: &[Attack] = &[
     ),
     word(
         "read-through-link",
-        "read the run's files through a link in the own folder",
+        "read the run's files through a link in its own folder",
         "os.symlink(RUN + '/secret', 'link')\nif has('link'): success()",
     ),
     word(
         "read-hard-link",
-        "link the run's files into the own folder",
+        "hard-link the run's files into its own folder",
         "os.link(RUN + '/secret', OWN + '/hard')\nif has(OWN + '/hard'): success()",
     ),
     word(
@@ -91,7 +91,7 @@ pub const ATTACKS: &[Attack] = &[
     ),
     word(
         "read-descriptors",
-        "read what the caller has open",
+        "read the caller's open files through /proc",
         "for fd in range(1000):\n    try:\n        with open(f'/proc/{CALLER}/fd/{fd}', 'rb', buffering=0) as f:\n            if fd > 2 and SECRET.encode() in os.pread(f.fileno(), 1 << 16, 0): success()\n    except OSError: pass",
     ),
     word(
@@ -134,7 +134,7 @@ if ctypes.get_errno() in (0, errno.EFAULT): success()
     ),
     word(
         "own-environment",
-        "find keys in the own environment",
+        "find keys in its own environment",
         "if any('KEY' in name for name in os.environ): success()",
     ),
     word(
@@ -171,7 +171,7 @@ if ctypes.get_errno() in (0, errno.EFAULT): success()
     word("read-home", "read the user's home folder", "if has(HOME_FILE): success()"),
     root(
         "read-disk",
-        "read the disk below the file system",
+        "read the disk's block device",
         "for name in os.listdir('/dev'):\n    if name.startswith(('vd', 'sd', 'nvme', 'xvd')):\n        try:\n            with open('/dev/' + name, 'rb', 0) as f:\n                if f.read(512): success()\n        except OSError: pass",
     ),
     root(
@@ -181,13 +181,13 @@ if ctypes.get_errno() in (0, errno.EFAULT): success()
     ),
     word(
         "read-kernel-log",
-        "read the log of the kernel",
+        "read the kernel log",
         "if call(103 if X86 else 116, 10, 0, 0) >= 0: success()",
     ),
     // Changes.
     shown(
         "write-run-folder",
-        "add a result",
+        "append a forged result to the run",
         "open(RUN + '/results', 'a').write('forged')",
         Proof::Files,
     ),
@@ -216,7 +216,7 @@ if ctypes.get_errno() in (0, errno.EFAULT): success()
     ),
     root(
         "change-kernel-settings",
-        "set a parameter of the kernel, to what it is",
+        "set a kernel parameter to its present value",
         "path = '/proc/sys/kernel/core_pattern'\nheld = open(path).read()\nopen(path, 'w').write(held)\nsuccess()",
     ),
     root(
@@ -247,7 +247,7 @@ if ctypes.get_errno() in (0, errno.EFAULT): success()
     ),
     word(
         "ask-for-routes",
-        "ask the kernel for its network",
+        "open a netlink socket to query routes",
         "s = socket.socket(16, socket.SOCK_RAW, 0)\nsuccess()",
     ),
     root(
@@ -273,24 +273,24 @@ if ctypes.get_errno() in (0, errno.EFAULT): success()
     ),
     word(
         "trace-child",
-        "trace a child of the own",
+        "trace one of its own child processes",
         "pid = os.fork()\nif pid == 0:\n    time.sleep(5)\n    os._exit(0)\nr = call(101 if X86 else 117, 0x4206, pid, 0, 0)\nos.kill(pid, 9)\nif r == 0: success()",
     ),
     shown(
         "outlive",
-        "leave a process behind that has left its session",
+        "leave a process behind in another session",
         "if os.fork() == 0:\n    os.setsid()\n    if os.fork() == 0:\n        for fd in range(3): os.close(fd)\n        os.execvp('sleep', ['sleep', SURVIVOR])\n    os._exit(0)\nos.wait()",
         Proof::Survivor,
     ),
     shown(
         "outlive-kill",
-        "leave a process behind when the command is killed",
+        "leave a process behind after SIGKILL of the command",
         "if os.fork() == 0:\n    os.setsid()\n    os.execvp('sleep', ['sleep', SURVIVOR])\ntime.sleep(0.3)\nos.kill(os.getpid(), 9)",
         Proof::Survivor,
     ),
     shown(
         "endless-loop",
-        "go on when asked to end",
+        "continue after SIGTERM",
         "signal.signal(signal.SIGTERM, signal.SIG_IGN)\nsignal.signal(signal.SIGHUP, signal.SIG_IGN)\nprint('READY', flush=True)\nwhile True: pass",
         Proof::Unstoppable,
     ),
@@ -327,7 +327,7 @@ if ctypes.get_errno() in (0, errno.EFAULT): success()
     ),
     word(
         "memory-files",
-        "use memory in nameless files",
+        "fill memory with anonymous files (memfd)",
         "fd = os.memfd_create('x')\nfor _ in range(400): os.write(fd, bytes(1 << 20))\nsuccess()",
     ),
     word(
@@ -357,7 +357,7 @@ if ctypes.get_errno() in (0, errno.EFAULT): success()
     ),
     word(
         "flood-descriptors",
-        "open very many files",
+        "open 9,000 files",
         "import resource\nresource.setrlimit(resource.RLIMIT_NOFILE, (10000, 10000))\nheld = [os.open('/dev/null', 0) for _ in range(9000)]\nsuccess()",
     ),
     // Rights.
@@ -385,12 +385,12 @@ if ctypes.get_errno() in (0, errno.EFAULT): success()
     ),
     root(
         "set-host-name",
-        "rename the machine, to what it is called",
+        "set the host name to its present value",
         "socket.sethostname(socket.gethostname())\nsuccess()",
     ),
     word(
         "use-io-uring",
-        "use io_uring, which no filter sees",
+        "use io_uring, whose operations bypass system call filters",
         "params = ctypes.create_string_buffer(120)\nif call(425, 4, params) >= 0: success()",
     ),
     root(
@@ -405,17 +405,17 @@ if ctypes.get_errno() in (0, errno.EFAULT): success()
     ),
     root(
         "handle-of-file",
-        "open a file by its handle, past all folders",
+        "open a file by its handle, without a path",
         "h = ctypes.create_string_buffer(struct.pack('Ii', 128, 0) + bytes(128), 136)\nm = ctypes.c_int()\nif libc.name_to_handle_at(-100, ctypes.c_char_p(b'/usr'), h, ctypes.byref(m), 0) < 0: sys.exit()\nfd = os.open('/usr', 0)\nif libc.open_by_handle_at(fd, h, 0) >= 0: success()",
     ),
     word(
         "raise-limits",
-        "raise the limits of the own process",
+        "raise its own resource limits",
         "import resource\nresource.setrlimit(resource.RLIMIT_CORE, (1 << 20, 1 << 20))\nsuccess()",
     ),
     root(
         "raise-priority",
-        "take the processor from all others",
+        "raise its priority to the highest",
         "os.setpriority(os.PRIO_PROCESS, 0, -20)\nsuccess()",
     ),
 ];

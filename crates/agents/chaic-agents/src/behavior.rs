@@ -18,19 +18,19 @@ const SAME_PLACE_M: f32 = 0.4;
 pub struct ObservedInteraction {
     /// The acting agent.
     pub agent: AgentId,
-    /// Frame in which the action ended, or began if it is under way.
+    /// Frame in which the action ended, or began if it is in progress.
     pub frame: Frame,
     /// The action.
     pub action: Intent,
-    /// Outcome; `None` while the action is under way.
+    /// Outcome; `None` while the action is in progress.
     pub outcome: Option<Outcome>,
 }
 
 /// Known actions and held objects of other agents.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BehaviorLog {
-    /// Their interactions (no locomotion), oldest first. The end of an action replaces its entry
-    /// for the action under way.
+    /// Interactions of other agents (no locomotion), oldest first. The entry of an ended action
+    /// replaces its entry in progress.
     pub actions: Vec<ObservedInteraction>,
     /// Objects that the partner held when last observed, including contents.
     pub partner_holds: Vec<(TrackId, ClassId)>,
@@ -100,7 +100,7 @@ impl BehaviorModel for GroundTruthBehavior {
                 action: granted.action.map(TrackId::from),
                 outcome: granted.outcome,
             };
-            // A repeated report, or the end of the attempt. Otherwise it is a new attempt.
+            // A known attempt that is reported again, or its end. Otherwise it is a new attempt.
             let is_same = |old: &&mut ObservedInteraction| {
                 let is_repeated = old.frame == new.frame && old.outcome == new.outcome;
                 let is_end = old.outcome.is_none() && new.outcome.is_some();
@@ -159,8 +159,8 @@ impl InferredBehavior {
         InferredBehavior { watched, log: BehaviorLog::default(), lying_positions: BTreeMap::new() }
     }
 
-    /// Removes inferred pick-ups of objects that still lie at their old position, and held objects
-    /// that lie anywhere.
+    /// Removes inferred pick-ups of objects that still lie at their old position. Objects that lie
+    /// anywhere no longer count as held.
     fn revert_pick_ups(&mut self, memory: &Memory) {
         let is_lying =
             |t: &&MappedObject| t.last_seen == memory.frame && t.held_until <= memory.frame;
@@ -173,7 +173,7 @@ impl InferredBehavior {
                 self.lying_positions.insert(object.track, at);
                 continue;
             }
-            // Elsewhere it was put down after a real pick-up.
+            // At another place, it was put down after a real pick-up.
             let before = self.lying_positions.get(&object.track);
             if before.is_some_and(|b| b.distance(at) < SAME_PLACE_M) {
                 let is_it = |a: &ObservedInteraction| a.action.subject() == Some(object.track);

@@ -31,10 +31,10 @@ pub use visibility::is_hidden;
 /// Time before the end from which any goal place is used, frames (chosen on
 /// `gen-standard:7000..7010`, like the next two).
 pub(crate) const LAST_DELIVERY_FRAMES: Frame = 1000;
-/// Minimum height of a goal place while the partner may be a child, meters: only high ones count in
-/// one of its tasks, and high ones count in all (`world.high_goal_min_top_m`).
+/// Minimum height of a goal place while the partner may be a child, meters. In one of its tasks
+/// only high places count, and in the others they count too (`world.high_goal_min_top_m`).
 const HIGH_GOAL_M: f32 = 1.5;
-/// Probability of a child from which this applies.
+/// Probability of a child from which [`HIGH_GOAL_M`] applies.
 const CHILD_PROBABILITY: f32 = 0.4;
 
 /// Belief of one agent about its partner.

@@ -19,8 +19,8 @@ use crate::perception::{GroundTruthIds, Perception as _};
 use crate::rules::{ChildDraws, PlannerRules};
 use crate::track::{Intent, resolve_target};
 
-/// Draws that are escapes under [`ChildDraws::Constant`]: those of the original's first forty that
-/// are at most 20 of 100. An episode of 3000 frames has at most 30 draws.
+/// Draws, from 1, that are escapes under [`ChildDraws::Constant`]: of the original's first forty,
+/// those of at most 20 of 100. An episode of 3000 frames has at most 30 draws.
 const ESCAPE_DRAWS: [u32; 6] = [6, 14, 26, 38, 39, 40];
 /// Maximum number of points drawn.
 const MAX_DRAWS: usize = 2000;

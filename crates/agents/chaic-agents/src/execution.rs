@@ -43,7 +43,7 @@ pub fn new_navigator(walking: Walking) -> Box<dyn Navigator> {
     }
 }
 
-/// Number of sides from which a small object is looked for in one plan.
+/// Number of sides from which one plan looks for a small object.
 const MAX_SIDES_VIEWED: u32 = 2;
 
 /// Result of one execution step.
@@ -78,7 +78,7 @@ pub struct Executor {
     /// Positions from which an interaction with an object failed, with the frame.
     failed_positions: Vec<(TrackId, Vec2, Frame)>,
     rng: RngStream,
-    /// Frame in which the current plan began; moved on while following the child is needed.
+    /// Frame in which the current plan began; it advances while the child must be followed.
     plan_start: Frame,
     n_turns: u32,
     n_lifts: u32,
@@ -414,7 +414,7 @@ impl Executor {
         s: &mut ExecutionContext<'_>,
     ) -> Progress {
         let Some(agent) = s.briefing.companion(role) else { return Progress::Failed };
-        // The child is accompanied, not let through. The original's helpers stand in the way.
+        // The agent gives way to the partner, not to the child. The original's helpers never do.
         let gives_way =
             role == CompanionRole::Partner && s.memory.rules.walking == Walking::Careful;
         let navigator = self.navigator.as_mut();

@@ -454,9 +454,9 @@ impl Memory {
         Some(CostField::meters(cost).max(straight_m))
     }
 
-    /// Returns the known reachable goal places with path lengths in meters, nearest first. Places
-    /// out of reach come later, then those given up recently, and last those on which a put-on
-    /// failed.
+    /// Returns the known goal places with a known path and their path lengths in meters, nearest
+    /// first. Places beyond the reach of the hands come later, then those given up recently, and
+    /// last those on which a put-on failed.
     pub fn goal_places(&self) -> Vec<(&MappedObject, f32)> {
         let mut places: Vec<_> = self
             .objects

@@ -92,17 +92,17 @@ pub trait Perception: Send {
     /// Processes one observation. Missing images yield no detections.
     fn perceive(&mut self, observation: &Observation) -> Percepts;
 
-    /// Returns how an action can name this object; `None` if it cannot, because the object is not
-    /// in the last image.
+    /// Returns the target by which an action refers to this object; `None` if the object is not in
+    /// the last image.
     fn target(&self, track: TrackId) -> Option<Target>;
 
-    /// Returns whether objects must be in the image to be named, so that interactions need them in
-    /// view.
+    /// Returns whether actions can refer only to objects in the image. Interactions then require
+    /// the object in view.
     fn uses_pixel_targets(&self) -> bool {
         false
     }
 
-    /// Returns whether ids are visible to the perception only, which degrades them.
+    /// Returns whether only the perception sees ids, which it uses to imitate detection errors.
     fn hides_ids(&self) -> bool {
         false
     }
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn objects_are_detected_up_to_ten_metres_and_people_at_any_distance() {
+    fn objects_are_detected_up_to_ten_meters_and_people_at_any_distance() {
         for (z, is_seen) in [(-8.0, true), (-14.0, false)] {
             let mut toy = Toy::room(40.0, 40.0);
             let bed = toy.add(ToyObject::new("bed", [2.0, 0.0, z], [1.6, 1.0, 1.6]));

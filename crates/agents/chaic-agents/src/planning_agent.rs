@@ -156,7 +156,7 @@ impl<P: Policy> PlanningAgent<P> {
         self.behavior.log()
     }
 
-    /// Returns how an action names this object; `None` if it is not in view.
+    /// Returns the target by which an action refers to this object; `None` if it is not in view.
     pub fn target(&self, track: TrackId) -> Option<Target> {
         self.perception.target(track)
     }
@@ -256,7 +256,7 @@ impl Episode {
         }
     }
 
-    /// Handles an intent whose object no image from here shows. Returns whether the plan goes on
+    /// Handles an intent whose object is in no image from here. Returns whether the plan continues
     /// from another side; otherwise the object is ignored for a while.
     fn views_from_elsewhere(&mut self, intent: Intent) -> bool {
         let Some(track) = intent.subject() else { return false };
@@ -268,7 +268,7 @@ impl Episode {
         goes_on
     }
 
-    /// Asks the policy for a plan; `None` if the current plan stays.
+    /// Asks the policy for a plan; returns `None` if the current plan continues.
     fn choose<P: Policy>(
         &mut self,
         policy: &mut P,
@@ -416,7 +416,7 @@ impl<P: Policy> Agent for PlanningAgent<P> {
         let Some(episode) = &mut self.episode else { return };
         episode.update(observation, self.perception.as_mut());
         if let Some(span) = self.policy.memory_frames() {
-            // It remembers the object to which it is going.
+            // The agent does not forget the object to which it walks.
             let kept = episode.plan.and_then(|plan| plan.subject()).map(|subject| subject.track);
             episode.memory.objects.forget_unseen(span, kept, episode.memory.frame);
         }

@@ -1,4 +1,4 @@
-//! Team planning: who fetches what, in which order, before the time is up.
+//! Team planning: which person fetches which objects, in which order, in the remaining time.
 //!
 //! **What it is**: a small model of the rest of the episode ([`TeamProblem`]), a simulation of both
 //! people in it ([`simulation`]), and a search for the helper's best sequence of operations

@@ -34,7 +34,7 @@ impl fmt::Display for TrackId {
 /// Action whose target is a track.
 pub type Intent = Action<TrackId>;
 
-/// Converts an intent to an action; `None` if its target cannot be named now.
+/// Converts an intent to an action; `None` if the action cannot refer to its target now.
 pub fn resolve_target(
     intent: Intent,
     target: impl Fn(TrackId) -> Option<Target>,

@@ -52,8 +52,8 @@ pub enum ContinuationError {
 /// recorded none.
 ///
 /// # Errors
-/// [`ContinuationError`] if the trace is unreadable or altered or ends before the frame, has no helper or a
-/// partner that cannot act again, or if the helper is unknown, has no grant of ids or cannot decide.
+/// [`ContinuationError`] if the trace is unreadable or altered, ends before the frame, or has no helper or
+/// a partner that cannot act again. Also if the helper is unknown, has no grant of ids or cannot decide.
 pub fn continue_with(
     bytes: &[u8],
     episode: &Episode,

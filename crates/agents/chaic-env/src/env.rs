@@ -218,8 +218,8 @@ impl Env {
 
     /// Renders the color image of an agent: RGB, u8, shape [height, width, 3].
     ///
-    /// It is for learners that need color at few observations. Their sensors have none, so the other
-    /// observations are drawn without it.
+    /// It is for learners that need color in few observations. Their sensors request no color, so
+    /// the other observations are rendered without it.
     ///
     /// # Panics
     /// If the episode has no such agent.
@@ -252,7 +252,7 @@ impl Env {
         self.waiting().any(|a| a == agent)
     }
 
-    /// Sets the next action of a [waiting](Env::waiting) agent. It starts once all agents have chosen.
+    /// Sets the next action of a [waiting](Env::waiting) agent. It starts when all of them have one.
     ///
     /// Returns false, and changes nothing, if the agent is not waiting.
     pub fn submit(&mut self, agent: AgentId, action: Action) -> bool {
@@ -443,7 +443,7 @@ impl Env {
         }
         let choices = waiting.iter().filter_map(|a| self.turns[a.index()].close()).collect();
         for agent in submit_all(&mut self.world, choices, sink)? {
-            // The trace lacks its thought, so the next decision records one in any case.
+            // The trace lacks the thought of this agent, so its next decision always records one.
             self.turns[agent.index()].recorded.thought = None;
         }
         Ok(true)

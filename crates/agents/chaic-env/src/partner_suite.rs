@@ -101,7 +101,7 @@ impl SuitePartner {
         SuitePartner { name, partner, person: PersonChange::draw(seed) }
     }
 
-    /// Returns the problem of an entry; its agent is one that no registry has to know, or a plain name.
+    /// Returns the problem of an entry. Its agent must be a plain name, or one that needs no registry.
     fn problem(&self) -> Option<String> {
         let SuitePartner { name, partner, person } = self;
         let is_name = |c: char| c.is_ascii_alphanumeric() || "_-".contains(c);

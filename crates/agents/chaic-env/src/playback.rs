@@ -18,7 +18,7 @@ use crate::trace::{Decision, Header, Record, Trace};
 /// Re-simulation of a trace: its decisions are submitted again to a world of the same setup.
 ///
 /// [`Playback::step`] advances one frame and refuses a trace that does not fit the world, for
-/// programs that show it. [`Playback::next_records`] returns the records that come out, for
+/// programs that show the trace. [`Playback::next_records`] returns the resulting records, for
 /// programs that compare them with the trace.
 ///
 /// `T` is a reference to a trace or a shared trace. A clone is a copy of the current state, from which
@@ -140,7 +140,7 @@ impl<T: Deref<Target = Trace>> Playback<T> {
     }
 
     /// Submits the decisions of the agents that wait now, runs frames until the next agent waits,
-    /// and returns the records that come out, without [`Record::End`].
+    /// and returns the resulting records, without [`Record::End`].
     ///
     /// Returns `None` once the episode is over, or if the trace has no decision for the agents that
     /// wait.
@@ -182,10 +182,10 @@ impl<T: Deref<Target = Trace>> Playback<T> {
         self.decisions.get(self.n_submitted).and_then(|next| decision(&self.trace, *next))
     }
 
-    /// Takes the next decision if it is this one, and notes its thought.
-    fn next_choice(&mut self, is_it: impl Fn(&Decision) -> bool) -> Option<ChosenAction> {
+    /// Takes the next decision if `accepts` returns true for it, and notes its thought.
+    fn next_choice(&mut self, accepts: impl Fn(&Decision) -> bool) -> Option<ChosenAction> {
         let next = *self.decisions.get(self.n_submitted)?;
-        let decision = decision(&self.trace, next).filter(|decision| is_it(decision))?;
+        let decision = decision(&self.trace, next).filter(|decision| accepts(decision))?;
         let Decision { agent, action, ref thought, .. } = *decision;
         let thought = thought.clone();
         if let (Some(thought), Some(slot)) = (&thought, self.thoughts.get_mut(agent.index())) {

@@ -23,8 +23,8 @@ pub(crate) struct ChosenAction {
 
 /// Submits the actions that agents chose in one frame, in order, and passes the records to `sink`.
 ///
-/// Drops the action of an agent that an earlier one engaged. Returns the agents of dropped actions whose
-/// thought had changed.
+/// Drops the action of an agent that an earlier action has engaged in a joint lift. Returns the
+/// agents of dropped actions whose thought had changed.
 ///
 /// # Errors
 /// Those of `sink`.

@@ -67,7 +67,7 @@ pub struct Header {
     pub branch_of: Option<BranchPoint>,
 }
 
-/// Point of another trace from which an episode goes on.
+/// Point of another trace from which an episode continues.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BranchPoint {
@@ -115,7 +115,7 @@ impl Header {
         serde_json::to_string(self).expect("a header has string keys")
     }
 
-    /// Returns the frame from which the helper decides itself, if another trace decides before.
+    /// Returns the frame at which the helper takes over from another trace; `None` if it does not.
     pub fn helper_takes_over(&self) -> Option<Frame> {
         let is_person = self.people.iter().any(|person| person.input.is_some());
         self.branch_of.filter(|_| !is_person).map(|branch| branch.frame)

@@ -1,4 +1,4 @@
-//! Tracks: what the helpers of a run may be granted.
+//! Tracks: bounds on the grants of the helpers of a run.
 //!
 //! A [`Track`] bounds grants, not names of helpers, so that it holds for helpers of every kind. A run
 //! checks all its helpers before it begins and each helper again before an episode; `verify` checks
@@ -99,7 +99,7 @@ impl Track {
         ))
     }
 
-    /// Checks how the process of a helper is confined, as the agent records it: `sandbox`, `trusted`, or
+    /// Checks the confinement of a helper's process, as the agent records it: `sandbox`, `trusted`, or
     /// `sandbox without` the missing parts. `None` is a helper within this process.
     ///
     /// # Errors
@@ -116,7 +116,7 @@ impl Track {
         }
     }
 
-    /// Checks by which perception and behavior recognition helpers play, as `--perception` and
+    /// Checks the perception and behavior recognition of helpers, as `--perception` and
     /// `--behavior` name them; `None` is ground truth.
     ///
     /// # Errors
@@ -160,7 +160,7 @@ impl Track {
         ))
     }
 
-    /// Returns the perception or behavior recognition to play by: the given one, or the one that the
+    /// Returns the perception or behavior recognition to use: the given one, or the one that the
     /// track requires.
     pub fn perception_or(self, given: Option<String>) -> Option<String> {
         given.or_else(|| self.info().perception.map(str::to_owned))

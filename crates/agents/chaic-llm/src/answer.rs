@@ -180,12 +180,12 @@ fn mentioned_plan(lower: &str, plans: &[String]) -> Option<usize> {
         .get(by_number.at..by_text.at)
         .is_some_and(|between| between.contains(['.', '!', '?', '\n']));
     let end = by_text.at + plans[by_text.number - 1].to_lowercase().len();
-    // Not `wait` in `waiting`.
+    // The word `wait` does not occur in `waiting`.
     let is_whole_word = !lower[end..].starts_with(char::is_alphanumeric);
     Some(if is_later_sentence && is_whole_word { by_text.number } else { by_number.number })
 }
 
-/// Finds the last occurrence of a word that `number` finds a number after.
+/// Finds the last occurrence of a word that is followed by a number, as `number` parses it.
 fn last_mention(
     lower: &str,
     word: &str,
@@ -235,7 +235,7 @@ fn plan_by_text(lower: &str, plans: &[String]) -> Option<Mention> {
     for i in order {
         let text = plans[i].to_lowercase();
         if let Some(at) = remainder.rfind(&text).filter(|_| !text.is_empty()) {
-            // Positions stay the same.
+            // The replacement has the same length, so positions stay valid.
             remainder = remainder.replace(&text, &"|".repeat(text.len()));
             found.push(Mention { at, number: i + 1 });
         }

@@ -238,8 +238,8 @@ impl Client {
         Ok(Reply::Answer { text, finish, usage, latency_ms: latency.as_millis() as u64 })
     }
 
-    /// Returns the start of a foreign text as one line. The key is masked first: a cut would leave a
-    /// part of it.
+    /// Returns the start of a text from the endpoint as one line. The key is masked first, because a
+    /// cut could leave a part of it.
     fn masked_summary(&self, text: &str) -> String {
         summary(&self.key.mask(text.to_owned()))
     }
@@ -319,7 +319,7 @@ fn failure(kind: FaultKind, detail: String) -> Failure {
     Failure { fault, is_retryable: true, retry_after: None }
 }
 
-/// Returns the start of a foreign text as one line.
+/// Returns the start of a text from an endpoint as one line.
 fn summary(text: &str) -> String {
     let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
     let clean: String = line.chars().filter(|c| !c.is_control()).take(MAX_DETAIL).collect();

@@ -39,7 +39,7 @@ impl Key {
         self.0.as_deref()
     }
 
-    /// Replaces the key in a foreign text, in case an endpoint repeats it.
+    /// Replaces the key in a text from an endpoint, which may repeat the key.
     pub fn mask(&self, text: String) -> String {
         match self.expose() {
             Some(key) if key.len() >= MIN_MASKED && text.contains(key) => text.replace(key, MASK),

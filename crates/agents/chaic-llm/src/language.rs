@@ -220,7 +220,7 @@ impl HelperRegistry for LanguageHelpers {
     }
 
     fn is_slow(&self, name: &str) -> bool {
-        // Names of partners are names of helpers, too.
+        // Every name of a partner is also the name of a helper.
         self.is_live() && is_language_helper(name)
     }
 }

@@ -214,8 +214,8 @@ impl DecisionLogWriter {
     /// Creates a record in a run folder, or continues an existing record of the same agent.
     ///
     /// # Errors
-    /// [`LlmError::NotContinued`] if there is a damaged or too long record, or one of another agent, which
-    /// stays as it is; if the record is a link or no regular file, or cannot be read or written.
+    /// [`LlmError::NotContinued`] if there is a damaged or too long record, or one of another agent; it
+    /// stays as it is. Also if the record is a link or no regular file, or cannot be read or written.
     pub fn open(run: &Path, path: &Path, header: &RecordHeader) -> Result<DecisionLogWriter> {
         create_folders_below(run, path.parent().unwrap_or(run))?;
         let before = match kind_below(run, path)? {

@@ -120,7 +120,7 @@ pub struct ShownAgent {
     pub decisions: Vec<ShownDecision>,
     /// Number of decisions whose passages are left out.
     pub n_left_out: usize,
-    /// Why the record cannot be read, if so.
+    /// Problem of a record that cannot be read; `None` otherwise.
     pub problem: Option<String>,
 }
 

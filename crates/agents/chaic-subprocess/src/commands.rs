@@ -28,7 +28,7 @@ struct RecordedCommand {
 }
 
 impl RecordedCommand {
-    /// Returns whether both start the same process, whatever its limits.
+    /// Returns whether both entries start the same process; their limits may differ.
     fn is_same_process(&self, other: &RecordedCommand) -> bool {
         let RecordedCommand { name, command, environment, .. } = other;
         (&self.name, &self.command, &self.environment) == (name, command, environment)

@@ -1,7 +1,7 @@
 //! Messages of the protocol between chaic and a helper process.
 //!
-//! docs/subprocess-helpers.md describes them. Types here fix the keys on the wire, whatever keys the
-//! same data has in traces.
+//! docs/subprocess-helpers.md describes them. The types of this module fix the keys on the wire,
+//! even if the same data has other keys in traces.
 
 use chaic_core::agent::Thought;
 use chaic_core::geom::Camera;

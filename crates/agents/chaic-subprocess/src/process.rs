@@ -108,7 +108,7 @@ impl HelperProcess {
             Err(_) => {}
         }
         frame.check().map_err(|text| self.broken(&format!("can't be sent {text}")))?;
-        // If the pipe is closed, the answer says why.
+        // If the process has closed the pipe, the wait below returns the reason.
         let sent = self.requests.as_ref().map(|requests| requests.send(frame));
         let start = Instant::now();
         let left = self.command.limits.episode.saturating_sub(self.waited);
@@ -261,7 +261,7 @@ fn shell(command: &HelperProgram) -> std::process::Command {
 fn shell(command: &HelperProgram) -> std::process::Command {
     use std::os::windows::process::CommandExt as _;
     let mut shell = std::process::Command::new("cmd");
-    // With /s, `cmd` removes the outer quotes and reads the rest as it stands.
+    // With /s, `cmd` removes the outer quotes and leaves the rest unchanged.
     shell.args(["/d", "/s", "/c"]).raw_arg(format!("\"{}\"", command.line));
     shell
 }

@@ -42,24 +42,24 @@ impl Hand {
 #[serde(rename_all = "snake_case")]
 pub enum Target {
     /// Object at this pixel of the agent's last image; column 0 is at the left, row 0 at the top.
-    /// The environment resolves it against an id image that the agent never receives. The action
-    /// fails with [`FailureReason::OutOfReach`] without an image, outside of it, or where it shows
-    /// no object.
+    /// The environment resolves the pixel with an id image that the agent never receives. The
+    /// action fails with [`FailureReason::OutOfReach`] if there is no image, or if the pixel is
+    /// outside the image or shows no object.
     Pixel {
         /// Column, 0 to width - 1.
         column: u32,
         /// Row, 0 to height - 1.
         row: u32,
     },
-    /// Entity id, for agents with granted ids. Without the grant it refers to nothing.
+    /// Entity id, for agents with granted ids. Without the grant, it refers to no object.
     Entity(EntityId),
 }
 
 /// An action with entity ids, as the world runs it and a trace records it.
 pub type ResolvedAction = Action<EntityId>;
 
-/// Action of an agent. It takes one or more frames; the agent decides again when it ends (paper
-/// section 3.3, "Action Space").
+/// Action of an agent. It takes one or more frames. The agent decides again when the action ends
+/// (paper section 3.3, "Action Space").
 ///
 /// `T` is the type of the object reference: a [`Target`] for agents, an [`EntityId`] in the world,
 /// and a track id inside an agent with its own tracker.

@@ -79,8 +79,8 @@ impl From<BelievedObject> for BelievedFields {
     }
 }
 
-/// Behavior of the child, by its own decision. The emergency rate of the original requires it
-/// (facts S8.4), so traces record it separately.
+/// Behavior mode of the child, reported by the child's agent. The original's emergency rate depends
+/// on it (facts S8.4), so traces record it separately.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ChildState {
@@ -104,8 +104,8 @@ pub enum AgentError {
     Broken(String),
 }
 
-/// An agent. It receives a briefing once, and is then asked for an action each time its last one
-/// ends.
+/// An agent. It receives a briefing once. Then it is asked for an action each time its last one has
+/// ended.
 ///
 /// It receives all information through [`Agent::reset`], [`Agent::act`] and [`Agent::observe`]. Equal
 /// sequences of calls must lead to equal actions: draw random numbers from a
@@ -124,8 +124,8 @@ pub trait Agent: Send {
     /// If the agent fails; it is not called again in this episode.
     fn act(&mut self, observation: &Observation) -> Result<Action, AgentError>;
 
-    /// Updates the memory while a recording chooses this agent's actions. From the takeover on,
-    /// [`Agent::act`] is called. Without this method the agent knows nothing of earlier turns.
+    /// Updates the memory while a recording chooses this agent's actions, until the agent takes
+    /// over. Without this method, the agent knows nothing of earlier decisions.
     fn observe(&mut self, _observation: &Observation) {}
 
     /// Returns the name of the perception model, if the agent uses an exchangeable one instead of

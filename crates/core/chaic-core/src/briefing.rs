@@ -38,7 +38,7 @@ pub struct Motion {
     pub turn_rad: f32,
     /// A step ends with the frame in which it has covered more than this distance, meters.
     pub stride_m: f32,
-    /// Agents step over lower objects, meters.
+    /// Height below which agents step over objects, meters.
     pub step_over_m: f32,
     /// Target distance of an approach to the nearest point of an object, meters.
     pub arm_reach_m: f32,
@@ -134,12 +134,12 @@ impl LayoutBlock {
 }
 
 impl Briefing {
-    /// Returns the companion with this role.
+    /// Returns the id of the companion with this role.
     pub fn companion(&self, role: CompanionRole) -> Option<AgentId> {
         self.companions.iter().find(|c| c.role == role).map(|c| c.agent)
     }
 
-    /// Returns the body of the companion with this role.
+    /// Returns the entity id of the companion's body.
     pub fn companion_entity(&self, role: CompanionRole) -> Option<EntityId> {
         self.companion(role).map(EntityId::from_agent)
     }

@@ -234,17 +234,17 @@ pub struct ClassInfo {
 }
 
 impl ClassInfo {
-    /// Returns whether one hand can carry it: targets, containers and fragile objects.
+    /// Returns whether one hand can carry such an object: a target, container or fragile object.
     pub fn is_carriable(&self) -> bool {
         matches!(self.role, Role::Target | Role::Container | Role::Fragile)
     }
 
-    /// Returns whether it can be a target of an episode.
+    /// Returns whether such an object can be a target of an episode.
     pub fn is_possible_target(&self) -> bool {
         matches!(self.role, Role::Target | Role::Fragile | Role::HeavyTarget)
     }
 
-    /// Returns whether it can be moved during an episode.
+    /// Returns whether such an object can be moved during an episode.
     pub fn is_movable(&self) -> bool {
         self.is_carriable() || matches!(self.role, Role::Obstacle | Role::HeavyTarget)
     }

@@ -53,8 +53,8 @@ impl EntityId {
         }
     }
 
-    /// Returns the body of an agent, or [`EntityId::NOTHING`] for an index that is not below
-    /// [`AgentId::MAX_AGENTS`].
+    /// Returns the entity id of an agent's body, or [`EntityId::NOTHING`] for an index that is not
+    /// below [`AgentId::MAX_AGENTS`].
     pub fn from_agent(agent: AgentId) -> EntityId {
         if agent.index() < AgentId::MAX_AGENTS {
             EntityId(EntityId::FIRST_PERSON.0 + u16::from(agent.0))
@@ -63,7 +63,7 @@ impl EntityId {
         }
     }
 
-    /// Returns the agent with this body.
+    /// Returns the agent with this body; `None` if the entity is no body.
     pub fn agent(self) -> Option<AgentId> {
         (EntityId::FIRST_PERSON..EntityId::FIRST_OBJECT)
             .contains(&self)

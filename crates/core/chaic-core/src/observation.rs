@@ -62,8 +62,8 @@ impl SensorConfig {
     pub const IMAGE_SIZES: RangeInclusive<u32> = 16..=2048;
     /// Maximum number of history images in one observation.
     pub const MAX_HISTORY_FRAMES: u32 = 256;
-    /// Maximum pixel data of one observation, bytes (64 MiB): color, depth and ids of 2,048 pixels,
-    /// and a history of 256 images of 128 pixels.
+    /// Maximum pixel data of one observation, bytes (64 MiB): color, depth and ids of 2,048 by
+    /// 2,048 pixels, and a history of 256 images of 128 by 128 pixels.
     pub const MAX_OBSERVATION_BYTES: u64 = 64 << 20;
 
     /// Returns whether any image channel is requested.
@@ -182,7 +182,7 @@ pub struct Grants {
 /// Accessor of a grant.
 type GrantField = fn(&mut Grants) -> &mut bool;
 
-// `skip_serializing_if` hands over a reference.
+// `skip_serializing_if` passes a reference.
 #[allow(clippy::trivially_copy_pass_by_ref)]
 fn is_false(b: &bool) -> bool {
     !b
@@ -273,8 +273,8 @@ pub struct Held {
     pub n_contents: u32,
     /// True if both hands hold this object: furniture.
     pub in_both_hands: bool,
-    /// Identity of the object, with the grant of ids. Otherwise the agent only knows what it saw
-    /// itself take.
+    /// Identity of the object, with the grant of ids. Without the grant, the agent knows only the
+    /// objects that it saw when it picked them up.
     pub identity: Option<HeldIdentity>,
 }
 
@@ -307,7 +307,7 @@ pub struct Proprioception {
     /// Objects in the left and the right hand. A rider's left hand holds the bicycle, whose
     /// contents are those of the basket. Furniture appears in both hands.
     pub hands: [Option<Held>; 2],
-    /// Action that has just ended, in terms of the agent's own object reference, with its outcome.
+    /// Action that has just ended, with the target as the agent named it, and the outcome.
     /// `None` at the start. Also `None` after an action that another agent's choice replaced by a
     /// joint lift (rules of the original), unless ids are granted.
     pub last: Option<(Action, Outcome)>,

@@ -68,7 +68,7 @@ impl RngStream {
     }
 }
 
-/// FNV-1a hash, 64 bits; it only has to separate purposes.
+/// Returns the 64-bit FNV-1a hash; it only has to separate purposes.
 fn fnv1a(bytes: &[u8]) -> u64 {
     bytes
         .iter()

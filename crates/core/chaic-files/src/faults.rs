@@ -1,8 +1,8 @@
 //! Injection of faults into file operations, for tests.
 //!
-//! A test program installs one [`FaultPlan`] for its process and then calls the code under test. The
-//! operations on each path are numbered from 0, which does not depend on other threads. No option, environment variable or feature
-//! installs a plan, so a user cannot do so by accident.
+//! A test program installs one [`FaultPlan`] for its process and then calls the code under test.
+//! Operations are numbered from 0 for each path, so the numbers do not depend on other threads. No
+//! option, environment variable or feature installs a plan, so a user cannot do so by accident.
 //!
 //! **Limits**: a power failure keeps all finished renames, removals and new folders, as a journaling
 //! file system does. The removal of a folder with its content is one operation.
@@ -161,7 +161,7 @@ struct State {
     operations: Vec<OperationRecord>,
     /// True once the disk is full.
     is_full: bool,
-    /// Flushed length of each file with bytes that were not flushed.
+    /// Flushed length of each file that has unflushed bytes.
     flushed_len: BTreeMap<PathBuf, u64>,
 }
 
@@ -236,7 +236,7 @@ pub(crate) fn perform_write(
     let Some(injector) = INJECTOR.get() else { return action(bytes) };
     let len_before = file.metadata()?.len();
     let half = &bytes[..bytes.len().div_ceil(2)];
-    injector.perform_some(Operation::Write, path, |state, fault| {
+    injector.perform_with_fault(Operation::Write, path, |state, fault| {
         state.flushed_len.entry(path.to_owned()).or_insert(len_before);
         match fault {
             Some(FaultKind::ShortWrite) => action(half),
@@ -257,7 +257,7 @@ impl Injector {
         action: impl FnOnce() -> io::Result<T>,
         record: impl FnOnce(&mut State),
     ) -> io::Result<T> {
-        self.perform_some(operation, path, |state, _| {
+        self.perform_with_fault(operation, path, |state, _| {
             let result = action()?;
             record(state);
             Ok(result)
@@ -265,7 +265,7 @@ impl Injector {
     }
 
     /// Performs an operation. Other threads wait, so no operation follows one that ends the process.
-    fn perform_some<T>(
+    fn perform_with_fault<T>(
         &self,
         operation: Operation,
         path: &Path,
@@ -303,7 +303,7 @@ impl Injector {
 fn drop_unflushed(state: &State) {
     for (path, len) in &state.flushed_len {
         let cut = fs::OpenOptions::new().write(true).open(path).and_then(|file| file.set_len(*len));
-        // A file that is gone has lost its bytes. Without another failure the test would be wrong.
+        // A removed file has lost its bytes already. Any other error would make the test wrong.
         match cut {
             Err(error) if error.kind() != io::ErrorKind::NotFound => process::abort(),
             _ => {}

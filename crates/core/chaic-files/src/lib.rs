@@ -3,7 +3,7 @@
 //! **What it is not**: it parses no file formats. [`toml_message`] words the errors of a parser of TOML.
 //!
 //! **Invariant**: only regular files are read, and each read has a limit. Links are followed only
-//! in paths from a user, never inside a folder of chaic, for reads and writes alike.
+//! in paths from a user, never inside a folder of chaic. This holds for reads and writes.
 
 mod kind;
 mod open;
@@ -62,7 +62,7 @@ impl FileError {
 pub type Result<T> = std::result::Result<T, FileError>;
 
 /// Writes a file atomically: to a [`TemporaryFile`], which is then renamed. A link with either name is
-/// replaced, not followed. Other processes may write the same file; the last rename remains.
+/// replaced, not followed. Other processes may write the same file; the last rename wins.
 ///
 /// # Errors
 /// If the file system refuses. The temporary file is then removed if possible.
@@ -139,14 +139,14 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("secret");
         // The temporary file of another process is neither replaced nor removed.
-        let of_other = dir.path().join("secret.0.tmp");
-        fs::write(&of_other, b"other").unwrap();
+        let other_temporary = dir.path().join("secret.0.tmp");
+        fs::write(&other_temporary, b"other").unwrap();
         write_new_private(&path, b"first").unwrap();
         let error = write_new_private(&path, b"second").unwrap_err();
         assert_eq!(error.error.kind(), io::ErrorKind::AlreadyExists);
         assert_eq!(fs::read(&path).unwrap(), b"first");
-        assert_eq!(fs::read(&of_other).unwrap(), b"other");
-        assert_eq!(entries(dir.path()).unwrap(), [path.clone(), of_other]);
+        assert_eq!(fs::read(&other_temporary).unwrap(), b"other");
+        assert_eq!(entries(dir.path()).unwrap(), [path.clone(), other_temporary]);
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt as _;

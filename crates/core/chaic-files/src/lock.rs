@@ -8,7 +8,7 @@ use crate::{FileError, OutputFile, open_or_create};
 /// Name of the lock file in a locked folder.
 pub const LOCK: &str = ".lock";
 
-/// Maximum number of lock files that are opened and found removed before the folder counts as in use.
+/// Maximum number of attempts while others remove the lock file; then the folder counts as in use.
 const MAX_ATTEMPTS: usize = 8;
 
 /// Exclusive lock on a folder, held until it is dropped or the process ends.

@@ -86,7 +86,7 @@ pub fn open_or_create(path: &Path) -> Result<OutputFile> {
     open_to_write(path, File::options().read(true).write(true).truncate(false).create(true))
 }
 
-/// Opens a file with these options, which say whether a missing one is created.
+/// Opens a file for writing. The options determine whether a missing file is created.
 fn open_to_write(path: &Path, options: &mut OpenOptions) -> Result<OutputFile> {
     let found = kind(path)?;
     if found != EntryKind::Missing {

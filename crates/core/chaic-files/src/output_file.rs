@@ -23,8 +23,8 @@ impl OutputFile {
         &self.file
     }
 
-    /// Returns whether the path of the file still leads to it. Another process may have removed or
-    /// renamed it, or created another file of this name.
+    /// Returns whether the path still refers to this file. Another process may have removed or
+    /// renamed the file, or created another file of this name.
     #[cfg(unix)]
     pub(crate) fn has_its_name(&self) -> io::Result<bool> {
         use std::io::ErrorKind;
@@ -59,7 +59,7 @@ impl OutputFile {
         perform(Operation::Sync, &self.path, || self.file.sync_all())
     }
 
-    /// Flushes the content to the device, with the metadata that reading it needs.
+    /// Flushes the content to the device, with the metadata that is required to read it.
     ///
     /// # Errors
     /// If the file system refuses.

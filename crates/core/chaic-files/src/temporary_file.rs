@@ -13,8 +13,8 @@ pub const TEMPORARY_SUFFIX: &str = ".tmp";
 /// Maximum number of writers of one file at the same time: more than the cores of most machines.
 const MAX_WRITERS: usize = 256;
 
-/// Temporary file that replaces another file of its folder when it is complete. It is removed if it is
-/// dropped before.
+/// Temporary file that replaces another file of its folder when it is complete. If it is dropped
+/// before, it is removed.
 ///
 /// Its name is `NAME.tmp`, or `NAME.K.tmp` while other writers replace the same file. Each writer
 /// holds a lock on its temporary file. The file of a killed writer has no lock, and the next writer
@@ -101,10 +101,10 @@ fn claim(path: &Path) -> io::Result<Option<OutputFile>> {
         EntryKind::File => {
             let abandoned = match open::open_existing(path) {
                 Ok(file) => file,
-                Err(e) if is_of_other(&e) => return Ok(None),
+                Err(e) if is_taken(&e) => return Ok(None),
                 Err(e) => return Err(e),
             };
-            if !owns(&abandoned)? {
+            if !try_own(&abandoned)? {
                 return Ok(None);
             }
             // The lock on the abandoned file is held until another file has its name.
@@ -113,20 +113,20 @@ fn claim(path: &Path) -> io::Result<Option<OutputFile>> {
         _ => open::create_or_replace(path),
     };
     match created {
-        Ok(file) => Ok(owns(&file)?.then_some(file)),
+        Ok(file) => Ok(try_own(&file)?.then_some(file)),
         Err(e) if e.kind() == ErrorKind::AlreadyExists => Ok(None),
         Err(e) => Err(e),
     }
 }
 
 /// Returns whether a file cannot be opened because another writer renamed it or another user owns it.
-fn is_of_other(error: &io::Error) -> bool {
+fn is_taken(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::NotFound | ErrorKind::PermissionDenied)
 }
 
 /// Locks a file; returns whether it is locked now and still has its name. A file system without locks
 /// permits one writer only.
-fn owns(file: &OutputFile) -> io::Result<bool> {
+fn try_own(file: &OutputFile) -> io::Result<bool> {
     match file.as_file().try_lock() {
         Err(TryLockError::WouldBlock) => Ok(false),
         Ok(()) | Err(TryLockError::Error(_)) => file.has_its_name(),

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-/// Integer types whose names messages of a parser have, with their ranges in TOML.
+/// Integer types that a parser names in its messages, with their ranges in TOML.
 const INTEGERS: [(&str, i64, i64); 5] = [
     ("u8", 0, u8::MAX as i64),
     ("u16", 0, u16::MAX as i64),
@@ -11,8 +11,8 @@ const INTEGERS: [(&str, i64, i64); 5] = [
     ("usize", 0, i64::MAX),
 ];
 
-/// Formats an error of a TOML parser as [`toml_problem`] does, on one line, after the number of its line in
-/// the file.
+/// Formats an error of a TOML parser on one line: the number of its line in the file, then the message of
+/// [`toml_problem`].
 pub fn toml_message(text: &str, span: Option<Range<usize>>, message: &str) -> String {
     let problem = toml_problem(text, span.clone(), message).replace('\n', " ");
     match span.and_then(|span| text.get(..span.start)) {
@@ -21,8 +21,8 @@ pub fn toml_message(text: &str, span: Option<Range<usize>>, message: &str) -> St
     }
 }
 
-/// Returns the message of a TOML parser with ranges instead of names of integer types. `span` are the bytes of
-/// `text` that the error is about.
+/// Returns the message of a TOML parser, with ranges in place of the names of integer types. `span` is the
+/// byte range of the error in `text`.
 pub fn toml_problem(text: &str, span: Option<Range<usize>>, message: &str) -> String {
     let literal = span.and_then(|span| text.get(span));
     literal.and_then(large_integer).unwrap_or_else(|| with_range(message))

@@ -63,7 +63,7 @@ impl Policy {
 
     /// Adds the files in a command line with their folders, and the installation folders of its
     /// programs. Never adds a folder that contains the start folder, a masked folder or the home
-    /// folder: of a program there it adds the file alone.
+    /// folder. For a program in such a folder, it adds only the program file.
     pub fn add_from_command_line(&mut self, line: &str) {
         self.add_words(line, &env::var_os("PATH").unwrap_or_default());
     }

@@ -22,7 +22,7 @@ pub(crate) const SETUP_FAILED: u8 = 125;
 pub(crate) enum Stage {
     /// Enters namespaces, starts the inner stage and watches it.
     Outer,
-    /// Builds the root folder, gives up rights and becomes the shell.
+    /// Builds the root folder, drops rights and becomes the shell.
     Inner,
 }
 
@@ -31,8 +31,8 @@ pub(crate) enum Stage {
 pub(crate) enum Mode {
     /// No restrictions: the outer stage only monitors, and ends remaining processes.
     Trusted,
-    /// The command runs in the caller's file system, without the rights that a process can drop
-    /// itself.
+    /// The command runs in the caller's file system. It loses only the rights that a process can
+    /// drop itself.
     Process,
     /// All restrictions, with namespaces and a private root folder.
     Namespaces,

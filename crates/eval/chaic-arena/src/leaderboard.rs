@@ -55,7 +55,7 @@ pub struct LeaderboardTable {
 pub struct RefusedEntry {
     /// Name of its folder.
     pub folder: String,
-    /// Why it is refused, in one line.
+    /// Reason of the refusal, in one line.
     pub reason: String,
 }
 
@@ -85,9 +85,9 @@ impl LeaderboardBuilder {
         self.refused.push(RefusedEntry { folder: name(folder), reason });
     }
 
-    /// Adds a verified evaluation. It is refused if verification found a problem, if it is the same
-    /// submission as an earlier one, or if its built-in helpers played otherwise than those of an earlier
-    /// one with the same rules.
+    /// Adds a verified evaluation. It is refused if verification found a problem, or if it is the
+    /// same submission as an earlier one. It is also refused if its built-in helpers have other
+    /// results than those of an earlier evaluation with the same rules.
     pub fn add(&mut self, folder: &Path, report: EvaluationReport) {
         if let Some(problem) = report.problems.first() {
             return self.refuse(folder, problem);
@@ -163,7 +163,7 @@ fn name(folder: &Path) -> String {
     folder.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Returns why two evaluations with the same rules cannot be in one table.
+/// Returns the reason why two evaluations with the same rules cannot be in one table.
 fn conflict(earlier: &ConfirmedEntry, entry: &ConfirmedEntry) -> Option<String> {
     let (a, b) = (&earlier.score.submission, &entry.score.submission);
     if a.sha256 == b.sha256 {

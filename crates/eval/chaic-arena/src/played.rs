@@ -15,8 +15,8 @@ use chaic_eval::suite::{PartnerRun, SuiteFolder};
 
 use crate::error::{ArenaError, Result};
 
-/// The run of a submission on a sealed split, complete and read from its folder: a run with the ordinary
-/// partner, and one with each partner of a list if it was played with a list.
+/// Complete run of a submission on a sealed split, read from its folder. It has a run with the ordinary
+/// partner and, if it was played with a list of partners, one with each of them.
 #[derive(Debug)]
 pub struct PlayedRun {
     /// Run with the ordinary partner, and then with each partner of the list. Results are sorted by key.

@@ -215,8 +215,8 @@ impl Submission {
     }
 }
 
-/// Compares fields of a run with those of the manifest, each as name, value of the run and value of the
-/// manifest; the error names the first difference.
+/// Compares fields of a run with those of the manifest, each given as name, value of the run and value
+/// of the manifest. The error names the first difference.
 fn compare<const N: usize>(fields: [(&str, String, String); N]) -> std::result::Result<(), String> {
     match fields.into_iter().find(|(_, found, expected)| found != expected) {
         None => Ok(()),

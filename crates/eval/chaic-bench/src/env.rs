@@ -174,7 +174,7 @@ fn n_frames(batch: &EnvBatch) -> u64 {
     batch.envs().iter().map(|env| u64::from(env.world().state().frame)).sum()
 }
 
-/// Draws from the same distribution as the world benchmark, with pixels as targets.
+/// Draws an action from the same distribution as the world benchmark, with pixels as targets.
 pub(super) fn random_action(size: u32, rng: &mut RngStream) -> Action {
     let hand = if rng.chance(0.5) { Hand::Left } else { Hand::Right };
     let mut pixel = || rng.below(size as usize) as u32;

@@ -183,7 +183,7 @@ impl ScalingBench {
     }
 }
 
-/// Decisions per second of a batch on many cores, with measured times `[env][step]` in seconds.
+/// Returns the decisions per second of a batch on many cores; `times` are `[env][step]` in seconds.
 fn batch_speed(times: &[Vec<f64>], copies: usize, cores: usize) -> f64 {
     let n_steps = times.first().map_or(0, Vec::len);
     let mut seconds = 0.0;
@@ -197,8 +197,8 @@ fn batch_speed(times: &[Vec<f64>], copies: usize, cores: usize) -> f64 {
 }
 
 impl Cluster {
-    /// Every core produces a decision in `mean_s` seconds, sends it to the learner, and waits until the
-    /// learner has processed it.
+    /// Estimates the speed: every core produces a decision in `mean_s` seconds, sends it to the
+    /// learner, and waits until the learner has processed it.
     fn speed(&self, nodes: usize, mean_s: f64, image_bytes: usize) -> ClusterSpeed {
         let network_s = 8.0 * image_bytes as f64 / (1e6 * self.network_mbit_s);
         let network =

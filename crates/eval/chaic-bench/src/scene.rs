@@ -180,7 +180,7 @@ fn standing_point(setup: &Setup, room: &Rect, corner: usize) -> Vec2 {
     best.1
 }
 
-/// True if a camera at (x, z) is neither inside nor directly in front of an object.
+/// Returns whether a camera at (x, z) is neither inside nor directly in front of an object.
 fn is_clear_of(p: Vec2, object: &ObjectSpec) -> bool {
     let half = 0.5 * object.size_m();
     let reach = MIN_OBJECT_DISTANCE_M + Vec2::new(half.x, half.z).length();

@@ -99,8 +99,8 @@ pub fn measure_world(
     })
 }
 
-/// Draws from the same distribution as `benches/world.rs` of `chaic-episodes`: half of all actions
-/// are steps, a quarter turns, and the others interactions with objects of the episode.
+/// Draws an action from the same distribution as `benches/world.rs` of `chaic-episodes`: half of
+/// all actions are steps, a quarter turns, and the others interactions with objects.
 fn random_action(setup: &Setup, rng: &mut RngStream) -> ResolvedAction {
     let hand = if rng.chance(0.5) { Hand::Left } else { Hand::Right };
     let object = |rng: &mut RngStream| Setup::entity(rng.below(setup.things.len()));

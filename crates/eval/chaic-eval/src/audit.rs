@@ -32,7 +32,7 @@ use chaic_env::{
 };
 use chaic_episodes::Episode;
 use chaic_world::{JointLift, Setup, World};
-use recording_agent::{Log, RecordedDecision, RecordingAgent};
+use recording_agent::{ObservationLog, RecordedDecision, RecordingAgent};
 
 use crate::error::Result;
 
@@ -165,10 +165,10 @@ fn difference(a: &RecordedDecision, b: &RecordedDecision) -> Option<&'static str
     checks.into_iter().find(|(_, same)| !same).map(|(part, _)| part)
 }
 
-/// Returns whether rules or grants disclose all differences in granted data. These are removed
-/// obstacles, if the rules announce them, and the behavior of the partner in the image, if it is
-/// granted: its posture may not show a new action yet. The granted state discloses all objects, and
-/// the granted behavior at any place.
+/// Returns whether rules or grants disclose all differences in granted data. Rules may announce
+/// removed obstacles. Granted behavior shows the action of a partner in the image, even if its
+/// posture does not show the action yet. The granted state discloses all objects, and the
+/// behavior of the partner at any place.
 fn is_disclosed(pair: &RunPair<'_>, part: &str, a: &Observation, b: &Observation) -> bool {
     let undisclosed = |o: &Observation| {
         let mut granted = o.granted.clone();
@@ -195,9 +195,9 @@ fn is_perceptible([a, b]: &[World; 2], part: &str) -> bool {
         .any(|(at, half_m)| horizontal_distance(at, position) < TOUCH_RANGE_M + half_m)
 }
 
-/// Returns whether a joint lift explains a different duration of the helper's action: in one of the
-/// two worlds only, the partner chose the furniture that the helper chose last. Some rules then
-/// send the helper there from any distance.
+/// Returns whether a joint lift explains a different duration of the helper's action. Then the
+/// partner chose the furniture that the helper chose last, in one of the two worlds only. Some
+/// rules send the helper there from any distance.
 fn is_joint_lift([a, b]: &[World; 2], part: &str) -> bool {
     let is_called = |world: &World| {
         let chose = |agent: AgentId| {
@@ -233,7 +233,7 @@ fn differing_positions<'a>(a: &'a World, b: &'a World) -> impl Iterator<Item = (
 /// One of the two runs.
 struct AuditedRun {
     env: Env,
-    log: Arc<Mutex<Log>>,
+    log: Arc<Mutex<ObservationLog>>,
 }
 
 impl AuditedRun {
@@ -249,7 +249,7 @@ impl AuditedRun {
             pair.secret.change(&mut setup);
         }
         let episode = Episode::new(pair.episode.id(), "audit", None, setup)?;
-        let log = Arc::new(Mutex::new(Log::with_leak(leak)));
+        let log = Arc::new(Mutex::new(ObservationLog::with_leak(leak)));
         let RunPair { rules, image_size, .. } = *pair;
         let config = EpisodeConfig {
             rules,
@@ -282,7 +282,7 @@ impl AuditedRun {
         Ok(())
     }
 
-    fn log(&self) -> MutexGuard<'_, Log> {
+    fn log(&self) -> MutexGuard<'_, ObservationLog> {
         self.log.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -293,7 +293,7 @@ fn audit_slots(
     setup: &Setup,
     rules: PlannerRules,
     helper: Helper,
-    log: &Arc<Mutex<Log>>,
+    log: &Arc<Mutex<ObservationLog>>,
 ) -> Vec<AgentSlot> {
     let recorder = RecordingAgent { agent: helper.agent, log: Arc::clone(log) };
     let helper = Helper { agent: Box::new(recorder), grants: helper.grants };

@@ -7,7 +7,7 @@ use chaic_env::RunKey;
 
 use crate::metrics::{RunResult, Summary};
 
-/// Why an episode run is an example.
+/// Reason why an episode run is an example.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExampleRole {
     /// Its value is nearest to the mean.
@@ -21,7 +21,7 @@ pub enum ExampleRole {
 /// Episode run that is shown as an example.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Example {
-    /// Why it is shown.
+    /// Reason why it is shown.
     pub role: ExampleRole,
     /// The episode run.
     pub key: RunKey,

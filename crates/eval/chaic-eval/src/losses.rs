@@ -74,7 +74,7 @@ impl Losses {
         granted: &RunGrants,
     ) -> Result<Losses, String> {
         let others = helpers.iter().filter(|helper| !matches!(helper.as_str(), BOUND | NONE));
-        let steps: Vec<(&String, Vec<Step>)> = others
+        let steps: Vec<(&String, Vec<CauseDifference>)> = others
             .map(|helper| (helper, steps(helper, granted.helpers.get(helper).copied())))
             .collect();
         let compared = steps.iter().flat_map(|(_, steps)| steps);
@@ -167,13 +167,13 @@ fn on_common_episodes(results: &[RunResult], helpers: &BTreeSet<&str>) -> Vec<Ru
 
 /// Difference of two helpers that one cause explains.
 #[derive(Clone, Copy, Debug)]
-struct Step<'a> {
+struct CauseDifference<'a> {
     cause: &'static str,
     from: &'a str,
     to: &'a str,
 }
 
-impl Step<'_> {
+impl CauseDifference<'_> {
     /// Returns the mean of `from` − `to`.
     fn loss(&self, played: PlayedEpisodes<'_>) -> Loss {
         let pair = [self.to, self.from].map(str::to_owned);
@@ -185,7 +185,7 @@ impl Step<'_> {
 
 /// Returns the total loss of a helper with these grants, and the parts that are not zero by
 /// definition.
-fn steps<'a>(helper: &'a str, grants: Option<Grants>) -> Vec<Step<'a>> {
+fn steps<'a>(helper: &'a str, grants: Option<Grants>) -> Vec<CauseDifference<'a>> {
     let Grants { goal, state, .. } = grants.unwrap_or(Grants::NONE);
     // References from the upper bound to the helper's grants, with the cause of each difference.
     let path: &[(&'static str, &'static str)] = match (state, goal) {
@@ -194,14 +194,14 @@ fn steps<'a>(helper: &'a str, grants: Option<Grants>) -> Vec<Step<'a>> {
         (false, true) => &[("search", WITH_GOAL)],
         (false, false) => &[("search", WITH_GOAL), ("inference", WITHOUT)],
     };
-    let mut steps = vec![Step { cause: "total", from: BOUND, to: helper }];
+    let mut steps = vec![CauseDifference { cause: "total", from: BOUND, to: helper }];
     let mut from = BOUND;
     for (cause, to) in path {
-        steps.push(Step { cause, from, to });
+        steps.push(CauseDifference { cause, from, to });
         from = to;
     }
     if from != helper {
-        steps.push(Step { cause: "planning", from, to: helper });
+        steps.push(CauseDifference { cause: "planning", from, to: helper });
     }
     steps
 }

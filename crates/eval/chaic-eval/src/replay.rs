@@ -59,8 +59,8 @@ fn preference(helper: &str) -> usize {
     }
 }
 
-/// Returns those of these traces that are of an episode, by its id with or without the task, with their
-/// helpers; those of all episodes, helpers and seeds if none is given. `traces` are the
+/// Returns the traces among these that match the episode (id with or without the task), the helper and
+/// the seed, each with its helper. An absent value matches all. `traces` are the
 /// [`planned_traces`](crate::run::planned_traces) of a run.
 pub fn find_traces(
     traces: &[PathBuf],

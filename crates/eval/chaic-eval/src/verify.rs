@@ -473,7 +473,7 @@ fn without_counts(result: &RunResult) -> RunResult {
     result
 }
 
-/// Re-simulates the decisions of a trace; returns the first record that comes out different.
+/// Re-simulates the decisions of a trace; returns the first record that differs.
 ///
 /// # Errors
 /// If the episode is not the one of the trace.
@@ -484,7 +484,7 @@ pub fn verify(trace: &Trace, episode: &Episode, path: &Path) -> Result<Option<Mi
     let is_stopped = trace.end().is_none();
     let mut compare = |simulated: Record| {
         let expected = recorded.next();
-        // An episode may be stopped while actions run; what comes after that is not recorded.
+        // An episode may be stopped while actions run; later events are not recorded.
         if is_stopped && expected.is_none() {
             return None;
         }

@@ -44,8 +44,8 @@ impl EpisodeSetWriter {
         Ok(EpisodeSetWriter { folder, files: BTreeSet::new(), splits: BTreeSet::new() })
     }
 
-    /// Writes an episode from a file, which must be what this version of chaic generates from the seeds that
-    /// it names: license, origin and biases of other episodes are unknown.
+    /// Writes an episode from a file. It must equal the episode that this version of chaic generates from
+    /// the seeds in the file, because license, origin and biases of other episodes are unknown.
     ///
     /// # Errors
     /// [`ExportError::NotGenerated`] if the generator gives another episode; those of

@@ -19,7 +19,7 @@ const ENTRIES: [&str; 6] = ["data", "episodes", "meta", "videos", "README.md", "
 #[derive(Debug)]
 pub(crate) struct NewFolder {
     path: PathBuf,
-    /// Whether the folder did not exist before.
+    /// True if the folder did not exist before.
     is_new: bool,
     is_finished: bool,
 }

@@ -23,7 +23,7 @@ use crate::folder::{NewFolder, write_description};
 use crate::table::{self, Column};
 use description::People;
 
-/// Frames per second of the export, as in replays. The world itself has no unit of seconds.
+/// Frames per second of the export, as in replays: 30 frames are one second of walking.
 pub const FRAMES_PER_S: u32 = 30;
 /// Key of the video in tables.
 const VIDEO_KEY: &str = "observation.images.ego";

@@ -77,16 +77,16 @@ impl ExperimentFolder {
         let episodes = request.episodes.clone().ok_or_else(|| {
             EvalError::Options("give the folder with episode files by --episodes".to_owned())
         })?;
-        let matrix = ExperimentFolder {
+        let experiment = ExperimentFolder {
             path: path.to_owned(),
             plan: request.new_plan(&episodes)?,
             episodes: None,
         };
-        matrix.plan.check_names(&episodes, helpers)?;
-        let matrix = ExperimentFolder { episodes: Some(episodes), ..matrix };
+        experiment.plan.check_names(&episodes, helpers)?;
+        let experiment = ExperimentFolder { episodes: Some(episodes), ..experiment };
         create_folders(path)?;
-        matrix.write()?;
-        Ok(matrix)
+        experiment.write()?;
+        Ok(experiment)
     }
 
     /// Resumes the experiment in a folder. Switches may be added; other options must not change.
@@ -96,12 +96,12 @@ impl ExperimentFolder {
     pub fn resume(path: &Path, request: &ExperimentRequest) -> Result<ExperimentFolder> {
         let recorded = read(path)?;
         let plan = request.resumed_plan(&recorded, path)?;
-        let matrix =
+        let experiment =
             ExperimentFolder { path: path.to_owned(), plan, episodes: request.episodes.clone() };
-        if matrix.plan != recorded {
-            matrix.write()?;
+        if experiment.plan != recorded {
+            experiment.write()?;
         }
-        Ok(matrix)
+        Ok(experiment)
     }
 
     /// Returns the run request of a part.
@@ -191,14 +191,14 @@ fn read(path: &Path) -> Result<Experiment> {
 ///
 /// # Errors
 /// If no run has started, or one cannot be read.
-pub fn parts(matrix: &ExperimentFolder) -> Result<Vec<PartState>> {
-    let parts = matrix.plan.parts();
-    let has_started = |part: &ExperimentPart| RunFolder::is_run(&matrix.folder(part));
+pub fn parts(experiment: &ExperimentFolder) -> Result<Vec<PartState>> {
+    let parts = experiment.plan.parts();
+    let has_started = |part: &ExperimentPart| RunFolder::is_run(&experiment.folder(part));
     let Some(first) = parts.iter().find(|p| has_started(p)) else {
-        let text = format!("{} has no run yet; start the runs first", matrix.path.display());
+        let text = format!("{} has no run yet; start the runs first", experiment.path.display());
         return Err(EvalError::Options(text));
     };
-    let (folder, options) = RunFolder::read(&matrix.folder(first))?;
+    let (folder, options) = RunFolder::read(&experiment.folder(first))?;
     let planned = planned(&folder, &options)?;
     let environments = environments(&planned);
     let episodes: BTreeMap<(TaskId, String), (Frame, String)> = planned
@@ -216,11 +216,11 @@ pub fn parts(matrix: &ExperimentFolder) -> Result<Vec<PartState>> {
                 jobs.push(EpisodeJob { key, horizon: *horizon, environment: environment.clone() });
             }
         }
-        let (results, _) = read_results(&matrix.folder(&part).join("results.jsonl"), &jobs)?;
+        let (results, _) = read_results(&experiment.folder(&part).join("results.jsonl"), &jobs)?;
         let mut planned: Vec<RunKey> = jobs.into_iter().map(|job| job.key).collect();
         planned.sort();
         let granted = match has_started(&part) {
-            true => RunFolder::read(&matrix.folder(&part))?.0.granted()?,
+            true => RunFolder::read(&experiment.folder(&part))?.0.granted()?,
             false => None,
         };
         Ok(PartState { results, planned, part, environments: environments.clone(), granted })

@@ -325,19 +325,19 @@ fn invalid_plans_are_refused() {
     );
 
     let two = list(&["planner.walking", "world.blocking"]);
-    let matrix = ExperimentFolder::create(
+    let experiment = ExperimentFolder::create(
         &out,
         &ExperimentRequest { switches: two, ..default_request.clone() },
         &BuiltInHelpers,
     )
     .unwrap();
-    let names: Vec<String> = matrix.plan.parts().into_iter().map(|p| p.name).collect();
+    let names: Vec<String> = experiment.plan.parts().into_iter().map(|p| p.name).collect();
     let mut in_order: Vec<String> = differing_rules();
     in_order.retain(|r| r == "planner.walking" || r == "world.blocking");
     assert_eq!(names[..2], ["compat", "paper"]);
     let folders: Vec<String> = in_order.iter().map(|rule| format!("switch/{rule}")).collect();
     assert_eq!(names[2..], folders);
-    let given = matrix.run_request(&matrix.plan.parts()[2]).unwrap();
+    let given = experiment.run_request(&experiment.plan.parts()[2]).unwrap();
     assert!(given.no_traces && given.rules == Some(RuleSetName::Compat), "{given:?}");
     assert_eq!(given.rule_overrides, [format!("{}=paper", in_order[0])]);
     assert!(matches!(
@@ -345,7 +345,7 @@ fn invalid_plans_are_refused() {
         Err(EvalError::NotEmpty { .. })
     ));
     // No run has started; switches may be added, other options must not change.
-    assert!(parts(&matrix).unwrap_err().to_string().contains("has no run yet"));
+    assert!(parts(&experiment).unwrap_err().to_string().contains("has no run yet"));
     let more =
         ExperimentRequest { switches: list(&["world.reach_to"]), ..ExperimentRequest::default() };
     assert_eq!(ExperimentFolder::resume(&out, &more).unwrap().plan.switches.len(), 3);

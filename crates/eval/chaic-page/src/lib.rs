@@ -38,7 +38,7 @@ const SCRIPT: &str = include_str!("../bundle/page.js");
 const STUDY_SCRIPT: &str = include_str!("../bundle/study.js");
 /// Style of all pages (CSS), for light and dark displays.
 pub const STYLE: &str = include_str!("page.css");
-/// The ending selects escaping for HTML.
+/// Name and text of the template. The ending of the name selects escaping for HTML.
 const TEMPLATE: (&str, &str) = ("page.html", include_str!("page.html"));
 
 /// Writes the report of a run as a page into its folder: its scores, and replays of the examples. A

@@ -24,7 +24,7 @@ pub struct OverviewRow {
 pub struct Dot {
     /// Difference of the transport rates: 0 for -1, 50 for 0, 100 for 1.
     pub x: f64,
-    /// Height, so that dots of one place lie above each other.
+    /// Height; dots of one place are stacked.
     pub y: f64,
     /// Episode and its transport rates.
     pub text: String,
@@ -70,7 +70,7 @@ fn row(task: TaskId, runs: &[&PairedRun], examples: &[&RunKey]) -> OverviewRow {
         }
     };
     let mut dots: Vec<Dot> = runs.iter().map(dot).collect();
-    // Rings lie above other dots.
+    // Dots of examples are drawn last, so that their rings lie on top.
     dots.sort_by_key(|dot| dot.is_example);
     let count = |is: fn(f64) -> bool| runs.iter().filter(|run| is(difference(run))).count();
     OverviewRow {

@@ -101,7 +101,7 @@ pub struct Span {
 /// Example episode.
 #[derive(Clone, Debug, Serialize)]
 pub struct ExampleRow {
-    /// Why it is shown.
+    /// Reason why it is shown.
     pub heading: &'static str,
     /// Description of the episode and its result.
     pub text: String,

@@ -9,11 +9,11 @@ use crate::plan::{SEED, StudyPlan, Trial, hex};
 use crate::study::{PlaySettings, Seat, Simulator};
 
 /// Returns the content of the page of a study. If the simulator runs on the server, neither episodes nor goals
-/// follow from it: the page has no episodes, no names of conditions and no digest of them.
+/// follow from it. The page then has no episodes, no names of conditions and no digest of them.
 pub fn page_content(plan: &StudyPlan) -> Value {
     let mut content = full_content(plan);
     if plan.study().play.simulator == Simulator::Server {
-        // The order of the conditions follows from the digest of the study, so conditions that look equal are one.
+        // The order of conditions follows from the digest of the study, so conditions that look equal are merged.
         let mut kinds: Vec<Value> = Vec::new();
         let mut kind_of = Vec::new();
         for condition in plan.conditions() {

@@ -14,7 +14,7 @@ pub const FORMAT: &str = "chaic-study-data";
 /// Version of the format.
 pub const VERSION: u32 = 1;
 /// Maximum size of a file, bytes: a participation has a few hundred kilobytes. While a record is parsed, it takes
-/// up to 48 times its size: 32 bytes for a value of 2, in a vector that grows. A file hence takes less than 1 GiB.
+/// up to 48 times its size: 32 bytes for a value of 2, in a vector that grows. So a file takes less than 1 GiB.
 const MAX_BYTES: u64 = 16 << 20;
 /// Maximum number of records: more than the decisions of a day.
 const MAX_RECORDS: usize = 500_000;
@@ -137,7 +137,7 @@ pub struct ParticipantData {
     pub slot: u32,
     /// Records after the first one, each with the number of its line.
     pub records: Vec<(usize, DataRecord)>,
-    /// Number of an incomplete last line, which is left out: a write was interrupted, or goes on.
+    /// Number of an incomplete last line, which is left out: a write was interrupted or still runs.
     pub torn_line: Option<usize>,
 }
 

@@ -35,7 +35,7 @@ pub struct ExportReport {
     pub traces: usize,
     /// Traces that agree with their re-simulation.
     pub verified: Vec<VerifiedTrial>,
-    /// Traces that differ, incomplete last lines, and other things to look at.
+    /// Traces that differ, incomplete last lines, and other findings.
     pub problems: Vec<String>,
     /// Slots without a complete participation: further participants can take them.
     pub open_slots: Vec<u32>,

@@ -68,7 +68,7 @@ fn highest() -> String {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Scoring {
-    /// Mean of the ratings, with reversed items turned around.
+    /// Mean of the ratings; those of reversed items are inverted.
     Mean,
     /// Sum of the distances from the worst rating, times 2.5: 0 to 100.
     Sus,

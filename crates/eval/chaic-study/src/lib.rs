@@ -1,8 +1,8 @@
 //! Studies in which people play episodes in a browser.
 //!
 //! **What it is**: a [`Study`] is the content of `study.toml`. A [`StudyPlan`] adds the conditions, the episodes
-//! and the digest, and assigns the trials of each slot. [`page_content`] is what the page of the study
-//! needs. [`ParticipantData`] is the file of a participant, whose records [`RecordCheck`] compares with the
+//! and the digest, and assigns the trials of each slot. [`page_content`] returns the content of the study's
+//! page. [`ParticipantData`] is the file of a participant, whose records [`RecordCheck`] compares with the
 //! plan; [`export`] checks such files and writes data sets, [`deletion`] removes a participant.
 //! [`lowest_free_slot`] is the slot of the next participant, and [`simulate`] a study with simulated ones.
 //!

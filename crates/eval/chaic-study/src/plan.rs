@@ -31,8 +31,8 @@ const SHORT_DIGITS: usize = 8;
 
 /// Problem with the keys of `study.toml`.
 type Problem = String;
-/// Result of looking episodes up.
-type Found<T> = std::result::Result<T, SplitError>;
+/// Result of a lookup of episodes.
+type LookupResult<T> = std::result::Result<T, SplitError>;
 
 /// A combination of factor levels.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -100,7 +100,7 @@ impl StudyPlan {
         }
         let mut pool = EpisodePool::default();
         let practice = study.practice.iter().map(|id| pool.add(id.clone()));
-        let practice = practice.collect::<Found<Vec<usize>>>().map_err(no_episode)?;
+        let practice = practice.collect::<LookupResult<Vec<usize>>>().map_err(no_episode)?;
         for condition in &mut conditions {
             condition.episodes = pool.of_condition(&study, condition).map_err(no_episode)?;
             if pool.episodes.len() > MAX_RESOLVED {
@@ -243,7 +243,7 @@ impl StudyPlan {
 }
 
 /// Returns the first listed episode that has the house of an earlier one.
-fn repeated_house(study: &Study) -> Found<Option<String>> {
+fn repeated_house(study: &Study) -> LookupResult<Option<String>> {
     let mut houses = BTreeSet::new();
     for id in study.practice.iter().chain(&study.episodes) {
         let episode = find_episode(id)?;
@@ -264,7 +264,7 @@ struct EpisodePool {
 
 impl EpisodePool {
     /// Returns the index of the episode with an id.
-    fn add(&mut self, id: String) -> Found<usize> {
+    fn add(&mut self, id: String) -> LookupResult<usize> {
         if let Some(found) = self.episodes.iter().position(|episode| episode.id() == id) {
             return Ok(found);
         }
@@ -278,7 +278,7 @@ impl EpisodePool {
     }
 
     /// Returns the indices of the episodes of a condition.
-    fn of_condition(&mut self, study: &Study, condition: &Condition) -> Found<Vec<usize>> {
+    fn of_condition(&mut self, study: &Study, condition: &Condition) -> LookupResult<Vec<usize>> {
         let person = condition.levels.iter().find(|(factor, _)| *factor == "person");
         let suffix = person.map_or(String::new(), |(_, level)| format!("/{level}"));
         let listed = listed(study, condition).into_iter();

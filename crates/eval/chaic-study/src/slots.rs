@@ -1,4 +1,4 @@
-//! Slots of a study: which one the next participant gets. Time is a parameter.
+//! Slots of a study, and the choice of the slot of the next participant. Time is a parameter.
 
 /// A participant with a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -89,7 +89,7 @@ pub enum WorldPace {
     /// The world waits for each decision.
     #[serde(rename = "waits")]
     TurnBased,
-    /// The world goes on, and the person's agent stands still.
+    /// The world continues, and the person's agent stands still.
     #[serde(rename = "goes_on")]
     RealTime,
 }

@@ -172,8 +172,8 @@ fn tasks_and_persons_select_episodes() {
     }
 }
 
-/// The counts of complete blocks are equal, so only blocks with open slots differ: by at most one for an
-/// even number of conditions, by two for an odd number.
+/// The counts of complete blocks are equal, so only blocks with open slots differ. The maximum is one
+/// for an even number of conditions, and two for an odd number.
 #[test]
 fn a_thousand_participants_with_drop_outs_stay_balanced() {
     let four = SMALL

@@ -110,8 +110,8 @@ impl FreeSpace {
         zs.flat_map(move |z| xs.clone().map(move |x| z * nx + x))
     }
 
-    /// Returns the free cells that are reachable from the cells around `start`. A body that stands
-    /// there may touch a wall by less than half a cell.
+    /// Returns the free cells that are reachable from the cells around `start`. A body at `start`
+    /// may overlap a wall by less than half a cell.
     pub(crate) fn flood(&self, start: Vec2) -> Vec<bool> {
         let mut reached = vec![false; self.free.len()];
         let near = Rect { min: start, max: start }.expanded(self.cell_m);

@@ -21,11 +21,11 @@ pub const VERSION: u32 = 1;
 const ATTEMPTS: u64 = 400;
 /// Attempts per place.
 const PLACE_ATTEMPTS: u64 = 100;
-/// Area that the original's maps cover.
+/// Area that the original's maps cover, meters.
 const BOUNDS: Rect = Rect { min: Vec2::new(-3.0, -7.5), max: Vec2::new(25.0, 6.0) };
 const ROAD_Z: [f32; 2] = [-2.7, 1.2];
 const PAVEMENT_Z: [f32; 2] = [-6.1, 3.9];
-/// Position of the goal place: the hydrant in front of the rider's house.
+/// Position (x, z) of the goal place, meters: the hydrant in front of the rider's house.
 const HYDRANT: [f32; 2] = [2.0, -5.5];
 /// Offset of shelves from the tent's center, along the road and towards it.
 const SHELF_OFFSET_M: [f32; 2] = [0.7, 0.5];
@@ -35,9 +35,9 @@ const SHELF_SCALE: [f32; 3] = [1.25, 1.0, 1.5];
 const SLOTS_M: [f32; 3] = [0.0, -0.4, 0.4];
 /// Minimum distance between partner and helper at the start, meters.
 const PEOPLE_APART_M: f32 = 5.0;
-/// Maximum offsets of shops from the paper's positions, meters: of all shops of one side along the
-/// road, of each shop along the road, and of each shop away from it. The values are ours: tents of
-/// 2.4 m every 5 m stay apart, and people start between them.
+/// Maximum offset of all shops of one side along the road from the paper's positions, meters. The
+/// next two: of each shop along the road, and away from it. The values are ours: tents of 2.4 m
+/// every 5 m stay apart, and people start between them.
 const SIDE_SHIFT_M: f32 = 1.0;
 const SHOP_SHIFT_M: f32 = 0.7;
 const SHOP_BACK_M: f32 = 0.3;

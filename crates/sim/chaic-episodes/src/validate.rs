@@ -38,9 +38,9 @@ impl fmt::Display for Problem {
 /// Strictness of the checks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Strictness {
-    /// It can be played.
+    /// The episode can be played.
     Playable,
-    /// It can also be solved completely and is well-formed, as all episodes of our generators are.
+    /// The episode can also be solved completely and is well-formed, like all generated episodes.
     Generated,
 }
 

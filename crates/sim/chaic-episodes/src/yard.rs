@@ -23,11 +23,11 @@ pub const VERSION: u32 = 1;
 const ATTEMPTS: u64 = 400;
 /// Attempts per place.
 const PLACE_ATTEMPTS: u64 = 100;
-/// Part of the street that the original's maps cover.
+/// Part of the street that the original's maps cover, meters.
 const BOUNDS: Rect = Rect { min: Vec2::new(-5.0, -7.5), max: Vec2::new(19.0, 6.0) };
 const ROAD_Z: [f32; 2] = [-3.2, 2.2];
 const PAVEMENT_Z: [f32; 2] = [-4.6, 3.4];
-/// Area in which furniture and people start.
+/// Area in which furniture and people start, meters.
 const PLACES: Rect = Rect { min: Vec2::new(-1.5, -2.75), max: Vec2::new(5.5, 1.25) };
 const TRUCK: [f32; 2] = [14.0, 0.0];
 /// Maximum offset of the truck from the paper's position along and across the road, meters. It

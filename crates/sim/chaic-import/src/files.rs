@@ -54,7 +54,7 @@ fn without_non_finite(text: &str) -> Cow<'_, str> {
     Cow::Owned(finite)
 }
 
-/// Returns the length of the JSON string at the start of a text, with its quotes; that of the text if it has no end.
+/// Returns the length of the JSON string at the start of a text, with its quotes; without an end, that of the text.
 fn string_length(text: &str) -> usize {
     let mut is_escaped = false;
     for (k, byte) in text.bytes().enumerate().skip(1) {

@@ -124,8 +124,8 @@ pub(crate) fn setup(
 }
 
 /// Returns the seed of an episode's random draws. The original's draws have no seed (facts S,
-/// summary 12), and all indoor episodes of its data have the seed 2824 (facts S12.2), so that seed
-/// alone would give all episodes of a run the same draws.
+/// summary 12). All indoor episodes of its data have the seed 2824 (facts S12.2). That seed alone
+/// would give all episodes of a run the same draws.
 fn draw_seed(source: &Source) -> u64 {
     let entry = &source.entry;
     let name = format!("{} {} {}", source.task, entry.scene, entry.layout);
@@ -182,8 +182,8 @@ fn empty_house(task: TaskId, house: &House<'_>) -> Setup {
     }
 }
 
-/// Returns the wall that fills a rectangle of Unity's plane. Ours extend half their thickness
-/// beyond both ends.
+/// Returns the wall that fills a rectangle of Unity's plane. Walls of chaic extend half their
+/// thickness beyond both ends.
 fn wall(rect: [f32; 4], height_m: f32, color: [u8; 3]) -> Wall {
     let Rect { min, max } = axes::rect(rect);
     let size = max - min;

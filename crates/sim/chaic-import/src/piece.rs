@@ -42,7 +42,7 @@ pub(crate) fn to_object(posed: &PosedModel, package: &Package) -> Result<ObjectS
     Ok(sized_object(model, mm3(position), mm(yaw_rad), size, posed.scale.y))
 }
 
-/// Returns the bounding box of tilted corners, in the frame that only the heading rotates.
+/// Returns the bounding box of tilted corners, in the frame that is rotated by the heading only.
 fn tilted_bounds(corners: [Vec3; 2], euler_deg: Vec3) -> [Vec3; 2] {
     let tip = Vec3::new(euler_deg.x, 0.0, euler_deg.z);
     let points = (0..8).map(|k| {

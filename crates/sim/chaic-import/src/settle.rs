@@ -45,7 +45,7 @@ pub(crate) struct Surroundings {
     /// Blocks that do not collide but hide objects.
     hidden: Vec<(Rect, UprightBox)>,
     /// Footprints of furniture.
-    shadows: Vec<UprightBox>,
+    footprints: Vec<UprightBox>,
 }
 
 impl Surroundings {
@@ -56,14 +56,14 @@ impl Surroundings {
             surfaces: Vec::new(),
             solids: Vec::new(),
             hidden: Vec::new(),
-            shadows: Vec::new(),
+            footprints: Vec::new(),
         };
         all.add_solids(UprightBox::from_walls(setup));
         // Bicycles block nothing; the rider starts beside one.
         let stays = |t: &&ObjectSpec| t.class.info().role != Role::Vehicle;
         for object in setup.things.iter().filter(stays) {
             all.surfaces.extend(tops(object));
-            all.shadows.extend(UprightBox::from_object(object));
+            all.footprints.extend(UprightBox::from_object(object));
             all.add_solids(UprightBox::from_object(object));
             // Objects inside a cushion cannot be found.
             all.hidden.extend(
@@ -151,7 +151,7 @@ impl Surroundings {
     ) -> Option<ObjectSpec> {
         let is_open = |t: &ObjectSpec| {
             let reach = t.half_longer_side_m() + FLOOR_CLEAR_M;
-            self.shadows.iter().all(|s| s.distance(to_xz(t.position)) >= reach)
+            self.footprints.iter().all(|s| s.distance(to_xz(t.position)) >= reach)
         };
         ring_offsets(MAX_FALL_DISTANCE_M, 0.06)
             .map(|offset| moved_to(object, to_xz(object.position) + offset, 0.0))

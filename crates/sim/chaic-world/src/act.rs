@@ -47,7 +47,7 @@ impl World {
         }
     }
 
-    /// Plans the first steps of an action, in reverse order. The judging steps add later ones.
+    /// Plans the first steps of an action, in reverse order. `Decide...` phases add later steps.
     fn plan_steps(
         &self,
         agent: AgentId,

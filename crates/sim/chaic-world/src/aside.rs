@@ -23,7 +23,7 @@ const HALF: i32 = 24;
 const SIDE: i32 = 2 * HALF + 1;
 /// Small objects whose position is higher than this do not lie on the floor, meters.
 const SMALL_OBJECT_M: f32 = 0.3;
-/// Maximum number of cells that may be cut off: corners without relevance.
+/// Maximum number of cells that may be cut off, such as corners, which do not matter.
 const MAX_CUT_OFF_CELLS: usize = 8;
 
 impl World {

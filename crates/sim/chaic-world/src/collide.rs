@@ -22,7 +22,7 @@ pub(crate) struct BlockIndex {
     members: Vec<u32>,
 }
 
-/// Circle of another agent in plan.
+/// Circle that another agent occupies in plan.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Disc {
     pub center: Vec2,
@@ -33,7 +33,7 @@ pub(crate) struct Disc {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Body {
     pub radius_m: f32,
-    /// Obstacles below this height are stepped over.
+    /// Obstacles below this height are stepped over, meters.
     pub low_m: f32,
     pub high_m: f32,
 }
@@ -54,7 +54,7 @@ const CELL_M: f32 = 1.0;
 /// Maximum radius of a body for which each cell lists its boxes, meters: that of a person
 /// (`Setup::check`). Larger bodies, which are scaled objects, are compared with all boxes.
 const MAX_LISTED_RADIUS_M: f32 = 1.0;
-/// Maximum number of push-out iterations; corners need two, narrow gaps a few more.
+/// Maximum number of push-out iterations; a corner needs two, a narrow gap a few more.
 const MAX_ITERATIONS: usize = 4;
 /// Overlap that is ignored, meters.
 const TOLERANCE_M: f32 = 1e-3;

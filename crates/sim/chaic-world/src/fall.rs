@@ -223,8 +223,8 @@ mod tests {
 
     #[test]
     fn the_support_is_the_lowest_contact() {
-        // The apple leans against a block of half of its height, while it stands on the table, and the other
-        // way round.
+        // The apple stands on the table and leans against a block of half of its height. Both orders of
+        // the two ids are tried.
         for entities in [[20, 23], [23, 20]] {
             let [below, beside] = entities.map(EntityId);
             let leaned = Obstacle {

@@ -18,7 +18,7 @@ use crate::world::World;
 const SPOT_SPACING_M: f32 = 0.12;
 /// Clearance around an object on a surface, meters.
 const CLEARANCE_M: f32 = 0.02;
-/// Maximum height of objects on which other objects stand, such as rugs, meters.
+/// Maximum height of flat objects that carry other objects, such as rugs, meters.
 const MAX_RUG_HEIGHT_M: f32 = 0.03;
 /// Center of a bicycle's basket in the frame of the bicycle, as a fraction of its size. The front
 /// faces -z.
@@ -104,9 +104,9 @@ impl World {
         state.position + state.rotation * local
     }
 
-    /// Returns the nearest free spot for the bottom of an object on the highest top of a place, or
-    /// on the ground beside it if the top is too small. Spots in `taken`, with their radii, are
-    /// reserved.
+    /// Returns the nearest free spot for the bottom of an object on the highest top of a place. If
+    /// the top is too small, the spot is on the ground beside it. Spots in `taken`, with their
+    /// radii, are reserved.
     pub(crate) fn free_spot_on(
         &self,
         place: EntityId,

@@ -98,7 +98,7 @@ pub struct Rules {
     pub min_progress_m: f32,
     /// Behavior of an agent that walks into something.
     pub blocking: Blocking,
-    /// Agents step over lower objects, meters (facts S1.5: the original's probe begins at 0.12 m).
+    /// Agents step over objects below this height, meters (facts S1.5: probe from 0.12 m).
     pub step_over_m: f32,
     /// Maximum distance from which an agent approaches an object, meters. It is measured from the
     /// center, less half of the longer side (facts S1.1).
@@ -150,7 +150,7 @@ pub struct Rules {
     pub break_chance_low: f32,
     /// The same chance above the child's reach.
     pub break_chance_high: f32,
-    /// The child counts as away beyond this distance from its guardian, meters (facts S8.4).
+    /// Distance from its guardian beyond which the child counts as away, meters (facts S8.4).
     pub child_away_m: f32,
     /// Minimum top height of a high goal place, meters (facts S5.1).
     pub high_goal_min_top_m: f32,

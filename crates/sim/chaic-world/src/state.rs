@@ -120,7 +120,7 @@ pub struct AgentState {
     pub last: Option<(ResolvedAction, Outcome)>,
     /// Last completed action other than movement and waiting: end frame, action and outcome.
     pub last_interaction: Option<(Frame, ResolvedAction, Outcome)>,
-    /// True if the legs still move from the previous frame.
+    /// True if the legs keep moving from the previous frame.
     pub in_stride: bool,
     /// Total distance walked, meters; the animation of legs and wheels depends on it.
     pub walked_m: f32,

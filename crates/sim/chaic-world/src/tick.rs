@@ -101,7 +101,7 @@ impl World {
         }
         person.in_stride = action == Action::MoveForward && outcome.is_success();
         self.record_event(EventKind::Ended { agent, action, outcome });
-        // The original reads its record of actions anew at every check, so a successful put-on also
+        // The original rereads its record of actions at every check, so a successful put-on also
         // covers what the agent held then and drops next (facts S5.3).
         if self.rules.put_on_delivers_all_released
             && is_put_on(action)

@@ -19,8 +19,8 @@ use crate::state::{ObjectLocation, Phase};
 use crate::world::World;
 
 impl World {
-    /// Returns the briefing of an agent before the episode. Only `grants` admits information about
-    /// the goal. The seed of a helper derives from `run_seed`.
+    /// Returns the briefing of an agent before the episode. It contains information about the goal
+    /// only if `grants` includes it. The seed of a helper derives from `run_seed`.
     pub fn briefing(&self, me: AgentId, grants: Grants, run_seed: u32) -> Briefing {
         let scene = self.setup.task.info().scene;
         let classes =
@@ -210,7 +210,7 @@ impl World {
     }
 
     /// Returns the rest position of a hand in the body frame: hanging, or in front of the body with
-    /// an object (facts S16.1, scaled with the height of the body).
+    /// an object. It is scaled with the height of the body (facts S16.1).
     fn hand_rest_in_body(&self, agent: AgentId, hand: Hand, holding: bool) -> Vec3 {
         let c = self.capability(agent);
         let side = if hand == Hand::Left { -1.0 } else { 1.0 };

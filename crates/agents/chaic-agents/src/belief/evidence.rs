@@ -414,7 +414,7 @@ impl Evidence {
         }
     }
 
-    /// Moves visits to `passed` whose object was seen lying after the partner had left.
+    /// Adds the objects of visits to `passed` if they were seen lying after the partner had left.
     fn update_passed(&mut self, memory: &Memory) {
         let (passed, objects) = (&mut self.passed, &memory.objects);
         self.visits.retain(|track, visit| {

@@ -18,7 +18,7 @@ use super::scene::{expected_per_class, scene_of, set_size, target_sets};
 const N_FRAGILE: u32 = 2;
 /// Number of objects of the extra class (facts S8.1, S11.2).
 const N_EXTRA: u32 = 1;
-/// Required number in a goal whose counts are unknown: more than any episode has.
+/// Required number of each class in a goal with unknown counts: more than any episode has.
 const UNKNOWN_COUNT: u32 = 9;
 /// Factor of the likelihood for each wanted object within reach that the partner passed.
 const PASSED_FACTOR: f32 = 0.74;
@@ -296,7 +296,7 @@ impl GoalBelief {
         Some(Goal { targets })
     }
 
-    /// Entropy of the target set, bits.
+    /// Returns the entropy of the target set, bits.
     pub fn entropy_bits(&self) -> f32 {
         let term = |p: f32| if p > 0.0 { -p * math::ln(p) / std::f32::consts::LN_2 } else { 0.0 };
         self.set_probabilities().into_iter().map(|(_, p)| term(p)).sum::<f32>().max(0.0)

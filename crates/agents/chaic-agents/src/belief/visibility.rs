@@ -1,4 +1,4 @@
-//! State and visibility of objects: whether one lies in play, and whether a person can see it.
+//! State and visibility of objects: whether they lie in play, and whether a person can see them.
 
 use chaic_core::{Frame, Vec2};
 

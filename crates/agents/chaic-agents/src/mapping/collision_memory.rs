@@ -8,7 +8,7 @@ use super::grid::Grid;
 const BUMP_FRAMES: Frame = 300;
 /// Radius around a bump that is avoided, meters.
 const BUMP_RADIUS_M: f32 = 0.2;
-/// Number of bumps within this distance of the latest that form a barrier, meters.
+/// Number of bumps that form a barrier, if they are within [`BARRIER_M`] of the latest one.
 const BARRIER_BUMPS: usize = 3;
 const BARRIER_M: f32 = 0.6;
 
@@ -18,8 +18,8 @@ struct Bump {
     until: Frame,
 }
 
-/// Recent bumps, and the positions treated as barriers: an obstacle there is unseen, or leaves too
-/// little room.
+/// Recent bumps, and positions treated as barriers. An obstacle at a barrier is unseen, or leaves
+/// too little room.
 #[derive(Clone, Debug, Default)]
 pub struct CollisionMemory {
     recent: Vec<Bump>,

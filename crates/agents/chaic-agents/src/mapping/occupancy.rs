@@ -23,7 +23,7 @@ const TOP_M: f32 = 2.4;
 const TALL_M: f32 = 2.2;
 /// Height above the body up to which obstacles block it, meters.
 const HEAD_MARGIN_M: f32 = 0.05;
-/// Confidence in an occupied cell after one observation, and its maximum.
+/// Increase of the confidence per observation of an occupied cell; next, its maximum.
 const CONFIDENCE_STEP: u8 = 3;
 const MAX_CONFIDENCE: u8 = 6;
 /// Side of the coarse squares that record when a place was last seen, cells (1 m).
@@ -49,7 +49,7 @@ pub enum CellOccupancy {
 pub struct Cell {
     /// Confidence that the cell is occupied, 0..=6.
     confidence: u8,
-    /// Bits of everything ever seen of it.
+    /// Bits (`SEEN_*`) of everything ever seen of the cell.
     seen_bits: u8,
 }
 
@@ -65,14 +65,14 @@ impl Cell {
         }
     }
 
-    /// Returns whether any part of it was ever seen within the known range.
+    /// Returns whether any part of the cell was ever seen within the known range.
     #[inline]
     pub fn is_known(self) -> bool {
         self.seen_bits & SEEN_NEAR != 0
     }
 
-    /// Returns whether something as tall as only walls are was ever seen there and extends down to
-    /// people's height. A lintel does not count: its floor is seen, and nothing in between.
+    /// Returns whether a part as tall as only walls was ever seen that extends down to people's
+    /// height. A lintel does not count: its floor is seen, and nothing in between.
     #[inline]
     pub fn is_tall(self) -> bool {
         let is_open = self.seen_bits & SEEN_FREE != 0 && self.seen_bits & SEEN_FIRM == 0;

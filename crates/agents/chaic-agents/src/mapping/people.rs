@@ -65,7 +65,7 @@ impl PersonMap {
         }
     }
 
-    /// Records a sighting. Without `top_m`, a detection of the same frame keeps its own.
+    /// Records a sighting. Without `top_m`, a detection of the same frame keeps its top height.
     fn record(&mut self, agent: AgentId, at: Vec3, top_m: Option<f32>, frame: Frame) {
         let known = self.people.iter().position(|p| p.agent == agent);
         let visible_m = known.map(|i| self.people[i]).filter(|p| p.frame == frame && p.is_in_view);

@@ -11,9 +11,9 @@ use crate::track::TrackId;
 
 /// An object that moved by less counts as unmoved, meters.
 const MOVED_M: f32 = 0.5;
-/// A place is in clear view if nothing is seen in front of it by more than this, meters. Greater
-/// depth behind the object cannot be required: on the floor, the floor behind it is hardly farther
-/// away.
+/// A place is in clear view if nothing is seen in front of it by more than this, meters. The depth
+/// behind an object cannot be tested: for an object on the floor, the floor behind it is only
+/// slightly farther away.
 const CLEAR_M: f32 = 0.05;
 /// Minimum number of pixels in which the object would be visible for a miss to count.
 const MISS_PIXELS: f32 = 12.0;
@@ -204,8 +204,8 @@ impl MappedObject {
         !self.class.info().is_carriable() && (has_moved || self.footprint.len() != n_points)
     }
 
-    /// Returns whether the object is on the path of the agents wherever it stands: an obstacle or a
-    /// piece of furniture that can be moved. The others are part of the occupancy map or too small.
+    /// Returns whether the object blocks agents at any position: an obstacle, or a piece of
+    /// furniture that can be moved. Others are part of the occupancy map or too small.
     pub fn blocks_path(&self) -> bool {
         let info = self.class.info();
         info.is_movable() && !info.is_carriable()
@@ -475,7 +475,7 @@ impl SemanticMap {
     }
 
     /// Marks the objects of these tracks as absent, because they probably do not exist. Absent targets
-    /// would be evidence that somebody took them, so only [`SemanticMap::forget_missing`] decides on them.
+    /// would be evidence of a pick-up, so only [`SemanticMap::forget_missing`] decides on targets.
     pub fn withdraw(&mut self, tracks: &[TrackId], possible_targets: &[ClassId]) {
         for track in tracks {
             let object = self.objects.get(track);
@@ -525,8 +525,8 @@ fn looks_held(
             detection.bottom_m > 0.3
                 && is_near(0.9)
                 && before.is_none_or(|t| {
-                    // An object that lies where it was before the person came is not held. One that
-                    // was held before, by a person who stands still, is.
+                    // An object that lies where it was before the person came is not held. An
+                    // object that was held before, by a person who stands still, is still held.
                     now < t.held_until
                         || !t.is_present
                         || t.position_in_world.distance(detection.position_in_world) > 0.15

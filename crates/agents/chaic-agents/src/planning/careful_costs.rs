@@ -21,7 +21,7 @@ const UNKNOWN_STATE: u8 = CellOccupancy::Unknown as u8;
 const OCCUPIED_STATE: u8 = CellOccupancy::Occupied as u8;
 const _: () = assert!(CellOccupancy::Free as u8 == 0 && CellOccupancy::Wall as u8 == 3);
 const _: () = assert!(UNKNOWN_STATE == 1 && OCCUPIED_STATE == 2);
-/// Cell in which the body would touch something.
+/// Cost of a cell in which the body would touch something.
 const TIGHT: u32 = 600;
 /// Added for cells near a recently seen person.
 const PERSON_EXTRA: u32 = 150;

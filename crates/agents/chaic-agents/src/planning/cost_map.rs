@@ -10,11 +10,11 @@ use crate::mapping::grid::{CELL_M, Grid};
 /// Cost of entering a free cell without obstacles nearby. Costs rise in the paper's order: free,
 /// unknown, near something, occupied, wall.
 pub const FREE: u32 = 10;
-/// Added for a cell whose floor was never seen (facts A1.5: 2.5 times a free cell).
+/// Extra cost of a cell whose floor was never seen (facts A1.5: 2.5 times a free cell).
 pub const UNKNOWN_EXTRA: u32 = 25;
-/// Occupied cell.
+/// Cost of an occupied cell.
 pub const OCCUPIED: u32 = 40_000;
-/// Cell with a wall.
+/// Cost of a cell with a wall.
 pub const WALL: u32 = 400_000;
 
 /// Chamfer distances: units per straight and diagonal step between cells.
@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn a_door_of_85_cm_lets_an_adult_through_and_one_of_a_metre_a_wheelchair() {
+    fn a_door_of_85_cm_lets_an_adult_through_and_one_of_a_meter_a_wheelchair() {
         // 0.85 m between surfaces leaves at least 5 free cells, 1 m at least 6.
         for (n_free, radius_m) in [(5usize, 0.20), (6, 0.35)] {
             let row = format!("{}{}{}", "#".repeat(6), ".".repeat(n_free), "#".repeat(6));

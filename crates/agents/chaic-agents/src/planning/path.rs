@@ -232,14 +232,14 @@ impl DijkstraSearch {
         *n_expanded += 1;
     }
 
-    /// Expands until a cost is final; `lowest` returns it from the costs of all cells. Returns it,
-    /// or `None` if it stays infinite.
+    /// Expands until the cost that `lowest` returns from the costs of all cells is final. Returns
+    /// this cost, or `None` if it stays infinite.
     fn expand_until_final(
         &mut self,
         costs: &CostMap,
         lowest: impl Fn(&[u32]) -> u32,
     ) -> Option<u32> {
-        /// Number of buckets between two looks at an infinite cost.
+        /// Number of buckets that are expanded between two checks of an infinite cost.
         const STRIDE: usize = 8;
         loop {
             let cost = lowest(&self.cost);
@@ -269,8 +269,8 @@ impl DijkstraSearch {
     }
 }
 
-/// Path costs from one position without passing occupied cells, computed as far as they are asked
-/// for.
+/// Path costs from one position without passing occupied cells. The search runs only as far as the
+/// queries require.
 #[derive(Clone, Copy, Debug)]
 pub struct PathCosts<'a> {
     /// Costs with which `dijkstra` started.
@@ -359,7 +359,7 @@ impl CostField {
         self.cost.get(cell).copied().filter(|c| *c < self.final_below)
     }
 
-    /// Returns whether [`CostField::cost`] answers for this cell as a search of the whole map.
+    /// Returns whether [`CostField::cost`] equals that of a search of the whole map for this cell.
     pub fn is_final(&self, cell: usize) -> bool {
         self.final_below == u32::MAX || self.cost(cell).is_some()
     }

@@ -20,9 +20,9 @@ pub struct ExternalPolicy {
 }
 
 impl ExternalPolicy {
-    /// Plans that can be started now, of one kind the nearest first. There are none while a plan is
-    /// executed. A plan that ended at once is left out until the next observation. If all did, only
-    /// waiting is left, so that a caller cannot choose the same plans forever.
+    /// Returns the plans that can be started now, the nearest of each kind first; none while a plan
+    /// is executed. A plan that ended at once is omitted until the next observation. If all did,
+    /// only waiting remains, so a caller cannot choose the same plans forever.
     pub fn valid(&self) -> &[Plan] {
         &self.valid
     }

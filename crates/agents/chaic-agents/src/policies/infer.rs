@@ -66,8 +66,8 @@ mod constants {
     /// Time after a sighting for which the helper follows the partner while the goal is unclear,
     /// frames. Later it explores, which finds the partner sooner.
     pub const LOST_FRAMES: Frame = 200;
-    /// Distance from the partner's last position within which turns count as a search for it, meters: that
-    /// at which a follower stops to look around, and a step.
+    /// Distance from the partner's last position within which turns count as a search for it, meters: the
+    /// stopping distance of a follower and one step.
     pub const SEARCH_RADIUS_M: f32 = 1.3;
     /// Goals with a lower probability are left out of the plan: to explore is better than to fetch
     /// objects that are probably unwanted.
@@ -83,7 +83,7 @@ mod constants {
     pub const IDLE_FRAMES: Frame = 60;
     /// Interval between reconsiderations of walks to objects, frames.
     pub const WALK_FRAMES: Frame = 80;
-    /// Time left from which a helper with a free hand explores rather than delivers, frames.
+    /// Time left above which a helper with a free hand explores rather than delivers, frames.
     pub const EXPLORE_LOADED_FRAMES: f32 = 900.0;
 }
 use constants::*;
@@ -97,7 +97,7 @@ enum Step {
     Remove(TrackId),
 }
 
-/// Infers and plans.
+/// Policy that infers goal and limits of the partner, and plans for both people.
 #[derive(Clone, Debug)]
 pub struct InferPolicy {
     options: InferOptions,
@@ -138,7 +138,7 @@ impl PartnerSearch {
         self.n_turns += u32::from(has_turned && distance_m < SEARCH_RADIUS_M);
     }
 
-    /// Returns whether the partner was not found: to search there again is useless.
+    /// Returns whether the search has failed; another search there would be useless.
     fn has_failed(&self) -> bool {
         self.n_turns >= SEARCH_TURNS
     }
@@ -288,8 +288,8 @@ impl InferPolicy {
         })
     }
 
-    /// Returns what to do while the goal is clear but no step is possible: what the rules would do
-    /// without containers.
+    /// Returns the plan if the goal is clear but no step is possible: that of the rules without
+    /// containers.
     fn without_step(&mut self, context: &Context<'_>, valid: &[Plan]) -> Plan {
         let hands = HandState::new(&context.memory.hands, context.briefing);
         let frames_left = context.briefing.horizon.saturating_sub(context.memory.frame) as f32;
@@ -329,7 +329,7 @@ impl InferPolicy {
         Some(Goal { targets: targets.collect() })
     }
 
-    /// Returns what to do while the goal is unclear.
+    /// Returns the plan while the goal is unclear.
     fn while_unclear(&mut self, context: &Context<'_>, valid: &[Plan]) -> Plan {
         let memory = context.memory;
         let hands = HandState::new(&memory.hands, context.briefing);

@@ -143,9 +143,9 @@ impl PartnerHabits {
         Ok(())
     }
 
-    /// Draws habits that differ from the rules. Each parameter deviates independently: the order with
-    /// probability 2/3; noise (5 to 40 percent), pause (10 to 180 frames) and memory (60 to 600
-    /// frames) with probability 1/2 each; load (1) and containers (none) with probability 1/4 each.
+    /// Draws habits that differ from the rules. Each parameter deviates independently. Probabilities:
+    /// order 2/3; noise (5 to 40 percent), pause (10 to 180 frames) and memory (60 to 600 frames)
+    /// 1/2 each; load (1) and containers (none) 1/4 each.
     pub fn draw(seed: u64) -> PartnerHabits {
         let mut stream = RngStream::new(seed, "drawn partner", 0);
         loop {

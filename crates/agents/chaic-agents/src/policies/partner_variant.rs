@@ -80,13 +80,13 @@ pub fn partner_habits(name: &str) -> Result<PartnerHabits, HabitsError> {
 }
 
 /// Returns the name that a run records: `drawn:SEED` and `habits:...` as all parameters that differ
-/// from the rules, and any other name unchanged. Recorded partners hence depend neither on the
+/// from the rules, and any other name unchanged. Recorded partners therefore depend neither on the
 /// distribution of drawn habits nor on the order of the parameters.
 pub fn recorded_partner_name(name: &str) -> String {
     PartnerHabits::from_name(name).map_or_else(|_| name.to_owned(), |habits| habits.to_string())
 }
 
-/// The rules of a partner with habits that deviate from them.
+/// Policy of a partner whose habits deviate from the rules.
 #[derive(Clone, Debug)]
 pub struct PartnerVariantPolicy {
     rules: RulePolicy,
@@ -139,7 +139,7 @@ impl PartnerVariantPolicy {
         target
     }
 
-    /// Returns whether it carries as many targets as it is used to.
+    /// Returns whether the partner carries its habitual number of targets.
     fn is_loaded(&self, context: &Context<'_>) -> bool {
         let Some(max) = self.habits.max_load else { return false };
         HandState::new(&context.memory.hands, context.briefing).targets.len() >= usize::from(max)

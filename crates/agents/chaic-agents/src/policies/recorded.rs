@@ -16,8 +16,8 @@ use crate::track::TrackId;
 const MIN_STEP_FRAMES: Frame = 600;
 /// Time for one step, relative to the recorded time. The partner may search where the person did not.
 const STEP_TIME_FACTOR: Frame = 2;
-/// Minimum time for which it searches for the object of a step before it goes on with later steps, frames:
-/// 5 s, about a look around.
+/// Minimum search time for the object of a step before the partner continues with later steps, frames: 5
+/// s, about the duration of a look around.
 const MIN_SEARCH_FRAMES: Frame = 150;
 /// Attempts beyond the recorded ones, for a step in which the person succeeded: outcomes are random.
 const EXTRA_ATTEMPTS: u32 = 2;
@@ -93,8 +93,8 @@ enum StepChoice {
     Postpone,
 }
 
-/// Repeats the steps of a recording, and then follows the rules. It walks, searches and remembers by
-/// itself; it knows of the recording only what its own person did.
+/// Policy that repeats the steps of a recording, and then follows the rules. It walks, searches and
+/// remembers by itself; of the recording it knows only the interactions of its own person.
 #[derive(Clone, Debug)]
 pub struct RecordedPolicy {
     recording: Arc<PlanRecording>,
@@ -172,7 +172,7 @@ impl RecordedPolicy {
 }
 
 impl PendingStep {
-    /// Chooses how to go on with the step, which has begun.
+    /// Chooses how to continue the step, which has begun.
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> StepChoice {
         match self.step.interaction {
             RecordedInteraction::PutIn => self.put_in(context, valid),
@@ -211,7 +211,7 @@ impl PendingStep {
         StepChoice::Plan(if valid.contains(&Plan::Deliver) { Plan::Deliver } else { Plan::Explore })
     }
 
-    /// Chooses how to go on with a pick-up or a removal.
+    /// Chooses how to continue a pick-up or a removal.
     fn reach(&mut self, track: TrackId, context: &Context<'_>, valid: &[Plan]) -> StepChoice {
         let memory = context.memory;
         let (mut has_succeeded, mut n_failed) = (false, 0);
@@ -257,7 +257,7 @@ impl PendingStep {
         }
     }
 
-    /// Chooses how to go on with a step whose object was not seen yet, or is not where it was.
+    /// Chooses how to continue a step whose object was not seen yet, or is no longer in its place.
     fn search(&self, context: &Context<'_>) -> StepChoice {
         let limit = MIN_SEARCH_FRAMES.max(self.step.duration_frames);
         let is_long = self
@@ -309,8 +309,8 @@ fn is_put_on(action: &Action<TrackId>) -> bool {
     matches!(action, Action::PutOn { .. })
 }
 
-/// Returns whether an attempt failed for a reason that a person learns from it. An attempt from a wrong
-/// position or with full hands counts as part of the way.
+/// Returns whether an attempt failed for a reason that a person finds out only by an attempt. A failure
+/// because of a wrong position or full hands counts as part of the way.
 pub fn is_real_failure(outcome: Outcome) -> bool {
     matches!(outcome, Outcome::Failure(FailureReason::BeyondLimits | FailureReason::Broke))
 }

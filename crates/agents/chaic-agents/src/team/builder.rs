@@ -21,12 +21,12 @@ use crate::track::TrackId;
 const DETOUR: f32 = 1.15;
 /// Mean speed on a path relative to full speed: turns and starts. Measured as above.
 const MEAN_SPEED: f32 = 0.9;
-/// Range in which the partner notices objects, meters. Ours: half of the original's 10 m visibility
-/// limit and a bit, since the partner rarely looks straight at an object.
+/// Range in which the partner notices objects, meters. Ours: 70 % of the original's 10 m visibility
+/// limit, since the partner rarely looks straight at an object.
 const NOTICE_M: f32 = 7.0;
 /// Path cells nearer than this to an obstacle are blocked by it for a wheelchair, meters.
 const OBSTACLE_M: f32 = 0.75;
-/// Factor of the straight line for places without a known path, and what is added, meters.
+/// Path length to a place without a known path: factor of the straight line, and meters added.
 const UNKNOWN_PATH: (f32, f32) = (1.5, 1.0);
 /// Time reserve at the end of the episode, frames.
 const MARGIN_FRAMES: f32 = 40.0;
@@ -278,7 +278,7 @@ fn helper_worker(briefing: &Briefing, memory: &Memory, classes: &[ClassId]) -> W
             Role::Container => {
                 contained = Some(held.contents.iter().filter_map(|(_, c)| index(c)).collect());
             }
-            // An object that no goal wants fills the hand all the same.
+            // An object that no goal wants still fills the hand.
             _ => loose.push(index(&class).unwrap_or(MAX_CLASSES - 1)),
         }
     }

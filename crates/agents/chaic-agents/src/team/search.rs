@@ -70,9 +70,9 @@ pub fn search_operations(
     search.rated(operations)
 }
 
-/// Returns a sequence in the order of the published rules: all obstacles, if they shall be removed;
-/// then trips that pick up the nearest targets until the hands are full. Trips for three targets or
-/// more begin with the nearest container, if containers shall be used.
+/// Returns a sequence in the order of the published rules: all obstacles if `removes`, then trips
+/// that pick up the nearest targets until the hands are full. If `uses_containers`, trips for three
+/// targets or more begin with the nearest container.
 pub fn greedy(problem: &TeamProblem, uses_containers: bool, removes: bool) -> Vec<Operation> {
     let obstacles = problem.places_of(PlaceKind::Obstacle).filter(|_| removes);
     let mut operations: Vec<Operation> = obstacles.map(Operation::Remove).collect();
@@ -206,7 +206,7 @@ impl<'a> Search<'a> {
         TeamPlan { operations: with_new, value }
     }
 
-    /// Removes each operation without which the value does not fall.
+    /// Removes each operation that does not raise the value.
     fn without_useless(&mut self, mut operations: Vec<Operation>) -> Vec<Operation> {
         let mut value = simulate(self.problem, &operations);
         let mut at = 0;

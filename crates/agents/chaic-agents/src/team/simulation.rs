@@ -11,7 +11,7 @@ use crate::rules::RuleProfile;
 /// Factor of the way to a place that the partner has not seen yet: it must search. Measured in
 /// episodes of `gen-standard:7000..7010`.
 const SEARCH_FACTOR: f32 = 1.8;
-/// The partner gives an object up if an attempt succeeds with less than this probability. Ours.
+/// The partner abandons an object if an attempt succeeds with less than this probability. Ours.
 const MIN_CHANCE: f32 = 0.6;
 /// Value of an early delivery relative to a late one, per delivery: 0.5 for a delivery now, 0 for
 /// one at the end. Ours: early deliveries are safer.
@@ -54,8 +54,8 @@ pub enum SimulatedEvent {
     Delivery(Delivery),
 }
 
-/// Returns the expected value of a sequence of the helper's operations over all hypotheses:
-/// deliveries that count, with a bonus for early ones and a small cost for each operation.
+/// Returns the expected value of a sequence of the helper's operations over all hypotheses. It
+/// counts deliveries, early ones more than late ones, minus a small cost for each operation.
 pub fn simulate(problem: &TeamProblem, operations: &[Operation]) -> f32 {
     let per_goal = problem.hypotheses.iter().map(|goal| {
         goal.probability * Simulation::new(problem, &goal.missing).run(operations, &mut |_| {})
@@ -257,8 +257,8 @@ impl<'a> Simulation<'a> {
         }
     }
 
-    /// Picks up what lies at a place, unless the other person has taken it. At an obstacle the removal
-    /// is done by then.
+    /// Picks up what lies at a place, unless the other person has taken it. An obstacle is already
+    /// removed by then.
     fn arrive(
         &mut self,
         worker: &Worker,

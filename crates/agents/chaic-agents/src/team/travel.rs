@@ -113,7 +113,7 @@ fn cheapest(from: PathCosts<'_>, destination: &Destination) -> Option<Vec2> {
 }
 
 /// Returns the path from the origin of `field` to `to` by descending the costs, and the obstacles
-/// (centers (x, z), at most 64) that it passes within `near_m`.
+/// that it passes within `near_m`. Obstacles are given as centers (x, z), at most 64.
 pub fn trace(
     costs: &CostMap,
     field: &CostField,

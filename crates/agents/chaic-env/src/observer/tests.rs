@@ -169,7 +169,7 @@ fn the_last_action_is_told_as_it_was_submitted() {
         last_action(&world, ME, &slot).map(|(action, _)| action)
     };
     assert_eq!(told(Grants::NONE, Some((pixel, done))), Some(pixel));
-    // An action that the environment chose is told only in terms that the agent may know.
+    // The agent learns of an action that the environment chose only in terms that it may know.
     for submitted in [None, Some((pixel, other))] {
         assert_eq!(told(Grants::NONE, submitted), None);
         assert_eq!(told(with_ids(), submitted), Some(entity));

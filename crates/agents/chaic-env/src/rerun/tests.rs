@@ -86,7 +86,7 @@ impl Agent for Scripted {
         Ok(action)
     }
 
-    /// Changes at the second action for the last time.
+    /// Changes for the last time at the second action.
     fn thought(&self) -> Thought {
         Thought { plan: format!("step {}", self.n_acts.min(2)), ..Thought::default() }
     }

@@ -1,5 +1,5 @@
-//! Tests that rules are set by name, that both sets consist of the listed rules, that `docs/rules.md`
-//! lists every rule with its values, and that old listings are read.
+//! Tests that rules are set by name, and that both sets consist of the listed rules. `docs/rules.md`
+//! lists every rule with its values, and old listings are read.
 
 use super::*;
 

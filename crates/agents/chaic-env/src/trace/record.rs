@@ -147,7 +147,7 @@ impl Record {
     /// # Errors
     /// If the line is not a record.
     pub fn from_line(line: &str) -> Result<Record, serde_json::Error> {
-        // Episodes are read from bytes too, and a second reader would enlarge the module of the pages.
+        // Episodes are also read from bytes; a second kind of reader would enlarge the web module.
         let bytes = line.as_bytes();
         if line.starts_with('[') {
             return serde_json::from_slice(bytes).map(Record::Decision);

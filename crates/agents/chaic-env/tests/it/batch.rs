@@ -1,5 +1,5 @@
-//! Tests that an environment behaves the same in a batch and alone, for any batch size and position, and
-//! that images are written to their place in the layout only.
+//! Tests that an environment behaves the same in a batch and alone, for any batch size and position.
+//! Images are written only to their place in the layout.
 
 use std::collections::BTreeMap;
 

@@ -1,5 +1,5 @@
-//! Tests that an episode depends on setup, seed, rules and actions only: not on who asks the agent, on
-//! interruptions, or on whether the environment is new or was reset.
+//! Tests that an episode depends on setup, seed, rules and actions only. The caller that asks the
+//! agent, interruptions, and a reset of the environment have no effect.
 
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};

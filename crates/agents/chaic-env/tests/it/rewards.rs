@@ -12,7 +12,7 @@ use chaic_world::{AgentSpec, ObjectSpec, Rules, Setup, World};
 
 #[test]
 fn objects_beyond_the_wanted_number_earn_nothing() {
-    // One object of each class is wanted; RHP, which is not told the goal, brings all it finds.
+    // One object of each class is wanted; RHP, which does not know the goal, delivers all it finds.
     let mut setup = find_episode("no_constraint/test/02").unwrap().setup().clone();
     setup.goal.targets.iter_mut().for_each(|(_, n)| *n = 1);
     let episode = Episode::new("surplus", "tests", None, setup).unwrap();

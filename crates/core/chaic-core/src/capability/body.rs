@@ -69,7 +69,7 @@ pub struct Capability {
     pub tremor: Option<Tremor>,
 }
 
-/// Default of abilities that a file does not specify.
+/// Returns the default of an ability that a file does not specify.
 fn able() -> bool {
     true
 }

@@ -31,15 +31,15 @@ pub struct ImpairmentInfo {
     pub id: Impairment,
     /// Name in commands and files.
     pub name: &'static str,
-    /// Predicate of a sentence about a person, for prompts and tables.
+    /// Predicate of a sentence about a person, such as `recovers by rest`; for prompts and tables.
     pub about: &'static str,
     /// Change of a capability.
     pub change: fn(Capability) -> Capability,
 }
 
-/// Blur that corresponds to a visual acuity of 3/60, as a standard deviation, radians. Below it,
-/// the World Health Organization (ICD-11, 9D90) classifies blindness: details under 20 minutes of
-/// arc merge.
+/// Blur that corresponds to a visual acuity of 3/60, as a standard deviation, radians. Details
+/// under 20 minutes of arc merge. The World Health Organization classifies a lower acuity as
+/// blindness (ICD-11, 9D90).
 const LOW_ACUITY_RAD: f32 = 20.0 / 60.0 * std::f32::consts::PI / 180.0;
 
 /// Table of all impairments. The values are ours: large enough for visible effects on scores.

@@ -10,11 +10,11 @@ use super::impairment::{IMPAIRMENTS, Impairment, Impairments};
 use super::person::{PersonKind, Persona};
 use crate::rng::RngStream;
 
-/// Prefix of the word for the walking speed.
+/// Prefix of the walking speed in a change, as in `speed80`.
 const SPEED: &str = "speed";
 /// Allowed walking speeds, percent of the person's own.
 const SPEED_PERCENT: std::ops::RangeInclusive<u16> = 50..=200;
-/// Walking speeds of drawn changes, percent: from a third slower to half as fast again.
+/// Lowest and highest walking speed of drawn changes, percent of the person's own.
 const DRAWN_SPEED_PERCENT: [u16; 2] = [65, 150];
 /// Probability of each impairment of [`DRAWN_IMPAIRMENTS`] in a drawn change.
 const IMPAIRMENT_CHANCE: f32 = 0.25;
@@ -57,7 +57,7 @@ impl PersonChange {
         )
     }
 
-    /// Returns the new persona; `None` if the person stays.
+    /// Returns the new persona; `None` if the change keeps the persona.
     pub fn persona(self) -> Option<Persona> {
         self.persona
     }
@@ -67,7 +67,7 @@ impl PersonChange {
         self.impairments
     }
 
-    /// Returns the capability with the changed walking speed, or `None` if the speed stays.
+    /// Returns the capability with the changed walking speed; `None` if the change keeps the speed.
     pub fn with_speed(self, capability: Capability) -> Option<Capability> {
         let factor = f32::from(self.speed_percent) / 100.0;
         (self.speed_percent != 100).then_some(Capability {
@@ -77,8 +77,8 @@ impl PersonChange {
         })
     }
 
-    /// Draws a change that a partner of any task can have: each of three impairments with probability
-    /// 0.25, and in half of the cases a speed of 65 to 150 percent. `None` if nothing changes.
+    /// Draws a change that a partner of any task can have. Each of three impairments has probability
+    /// 0.25. In half of the cases, the speed becomes 65 to 150 percent. `None` if nothing changes.
     pub fn draw(seed: u64) -> Option<PersonChange> {
         let mut stream = RngStream::new(seed, "drawn person", 0);
         let impairments =
@@ -130,7 +130,7 @@ impl fmt::Display for PersonChange {
     }
 }
 
-/// A text that is no change of a person.
+/// Error: the text is not a change of a person.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownPersonChange(String);
 
@@ -208,7 +208,7 @@ mod tests {
         let drawn: Vec<Option<PersonChange>> = (0..300).map(PersonChange::draw).collect();
         assert_eq!(drawn, (0..300).map(PersonChange::draw).collect::<Vec<_>>());
         let unchanged = drawn.iter().filter(|change| change.is_none()).count();
-        // 0.75 to the third power, by half.
+        // The expected number is 300 * 0.75^3 / 2 = 63.
         assert!((40..90).contains(&unchanged), "{unchanged}");
         let drawn: Vec<PersonChange> = drawn.into_iter().flatten().collect();
         for impairment in DRAWN_IMPAIRMENTS {

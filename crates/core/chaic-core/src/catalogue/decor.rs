@@ -50,7 +50,7 @@ const fn decor(
     ClassInfo { name, label, size_m, mass_kg, parts, palette, ..FURNISHING }
 }
 
-const GREY_FABRIC: Paint = Paint([134, 131, 127], Finish::Fabric);
+const GRAY_FABRIC: Paint = Paint([134, 131, 127], Finish::Fabric);
 const DARK_FABRIC: Paint = Paint([92, 90, 88], Finish::Fabric);
 const OAK: Paint = Paint([191, 159, 128], Finish::Wood);
 const WALNUT: Paint = Paint([112, 74, 50], Finish::Wood);
@@ -72,9 +72,9 @@ const CORNER_SOFA_M: [f32; 3] = [4.54, 0.9, 2.85];
 const CORNER_SOFA: [Part; 8] = in_meters(
     CORNER_SOFA_M,
     [
-        cuboid([-1.56, 0.26, -0.1], [0.58, 0.16, 2.65], GREY_FABRIC).surface(),
-        cuboid([0.5, 0.26, 0.715], [3.54, 0.16, 0.53], GREY_FABRIC).surface(),
-        cuboid([1.61, 0.26, 0.175], [1.32, 0.16, 0.55], GREY_FABRIC).surface(),
+        cuboid([-1.56, 0.26, -0.1], [0.58, 0.16, 2.65], GRAY_FABRIC).surface(),
+        cuboid([0.5, 0.26, 0.715], [3.54, 0.16, 0.53], GRAY_FABRIC).surface(),
+        cuboid([1.61, 0.26, 0.175], [1.32, 0.16, 0.55], GRAY_FABRIC).surface(),
         cuboid([-1.77, 0.0, 0.0], [1.0, 0.26, 2.85], DARK_FABRIC),
         cuboid([0.5, 0.0, 0.94], [3.54, 0.26, 0.97], DARK_FABRIC),
         cuboid([-2.06, 0.26, 0.09], [0.42, 0.54, 2.67], DARK_FABRIC),
@@ -87,7 +87,7 @@ const BENCH_SOFA_M: [f32; 3] = [1.28, 0.44, 0.48];
 const BENCH_SOFA: [Part; 6] = in_meters(
     BENCH_SOFA_M,
     [
-        cuboid([0.0, 0.3, 0.0], [1.28, 0.14, 0.48], GREY_FABRIC).surface(),
+        cuboid([0.0, 0.3, 0.0], [1.28, 0.14, 0.48], GRAY_FABRIC).surface(),
         cuboid([0.0, 0.26, 0.0], [1.2, 0.04, 0.42], DARK_STEEL),
         cuboid([-0.58, 0.0, -0.18], [0.05, 0.26, 0.05], STEEL),
         cuboid([0.58, 0.0, -0.18], [0.05, 0.26, 0.05], STEEL),

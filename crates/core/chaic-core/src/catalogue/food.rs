@@ -102,7 +102,7 @@ const CROWN: Paint = Paint([138, 124, 52], Finish::Skin);
 
 /// A banana of a bunch, along x with a small rotation away from its neighbors.
 const fn finger(y: f32, z: f32, turn_deg: f32) -> Part {
-    // The ring's center is 0.12 m behind the banana, so that its rotation shifts the banana
+    // The ring's center is 0.12 m behind the banana, so a rotation about it shifts the banana
     // sideways.
     let x = 0.12 * turn_deg.to_radians() - 0.006;
     arc([x, y, z + 0.106], 0.276, 0.036, 82.0, PEEL).turned([0.0, turn_deg, 0.0])

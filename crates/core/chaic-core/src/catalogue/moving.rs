@@ -83,7 +83,7 @@ const KETTLE: ClassInfo = ClassInfo {
     ..FURNITURE
 };
 
-const ALUMINIUM: Paint = Paint([198, 200, 203], Finish::Metal);
+const ALUMINUM: Paint = Paint([198, 200, 203], Finish::Metal);
 
 const NAVY_CHAIR_M: [f32; 3] = [0.42, 0.86, 0.51];
 const NAVY_CHAIR: ClassInfo = ClassInfo {
@@ -96,18 +96,18 @@ const NAVY_CHAIR: ClassInfo = ClassInfo {
     parts: &in_meters(
         NAVY_CHAIR_M,
         [
-            cuboid([0.0, 0.44, -0.02], [0.41, 0.026, 0.44], ALUMINIUM).surface(),
-            cuboid([-0.185, 0.0, -0.215], [0.03, 0.44, 0.03], ALUMINIUM),
-            cuboid([0.185, 0.0, -0.215], [0.03, 0.44, 0.03], ALUMINIUM),
-            cuboid([-0.185, 0.0, 0.215], [0.03, 0.84, 0.03], ALUMINIUM),
-            cuboid([0.185, 0.0, 0.215], [0.03, 0.84, 0.03], ALUMINIUM),
-            cuboid([0.0, 0.78, 0.225], [0.42, 0.08, 0.03], ALUMINIUM),
-            cuboid([-0.09, 0.46, 0.225], [0.035, 0.33, 0.016], ALUMINIUM).non_colliding(),
-            cuboid([0.0, 0.46, 0.225], [0.035, 0.33, 0.016], ALUMINIUM).non_colliding(),
-            cuboid([0.09, 0.46, 0.225], [0.035, 0.33, 0.016], ALUMINIUM).non_colliding(),
-            rod_x([0.0, 0.2, -0.215], 0.36, 0.02, ALUMINIUM).non_colliding(),
-            rod_z([-0.185, 0.24, 0.0], 0.42, 0.02, ALUMINIUM).non_colliding(),
-            rod_z([0.185, 0.24, 0.0], 0.42, 0.02, ALUMINIUM).non_colliding(),
+            cuboid([0.0, 0.44, -0.02], [0.41, 0.026, 0.44], ALUMINUM).surface(),
+            cuboid([-0.185, 0.0, -0.215], [0.03, 0.44, 0.03], ALUMINUM),
+            cuboid([0.185, 0.0, -0.215], [0.03, 0.44, 0.03], ALUMINUM),
+            cuboid([-0.185, 0.0, 0.215], [0.03, 0.84, 0.03], ALUMINUM),
+            cuboid([0.185, 0.0, 0.215], [0.03, 0.84, 0.03], ALUMINUM),
+            cuboid([0.0, 0.78, 0.225], [0.42, 0.08, 0.03], ALUMINUM),
+            cuboid([-0.09, 0.46, 0.225], [0.035, 0.33, 0.016], ALUMINUM).non_colliding(),
+            cuboid([0.0, 0.46, 0.225], [0.035, 0.33, 0.016], ALUMINUM).non_colliding(),
+            cuboid([0.09, 0.46, 0.225], [0.035, 0.33, 0.016], ALUMINUM).non_colliding(),
+            rod_x([0.0, 0.2, -0.215], 0.36, 0.02, ALUMINUM).non_colliding(),
+            rod_z([-0.185, 0.24, 0.0], 0.42, 0.02, ALUMINUM).non_colliding(),
+            rod_z([0.185, 0.24, 0.0], 0.42, 0.02, ALUMINUM).non_colliding(),
         ],
     ),
     ..FURNITURE
@@ -151,7 +151,7 @@ const WOOD_SHELVING: ClassInfo = ClassInfo {
     ..FURNITURE
 };
 
-const PRINTER_GREY: Paint = Paint([188, 190, 194], Finish::Matte);
+const PRINTER_GRAY: Paint = Paint([188, 190, 194], Finish::Matte);
 const PRINTER_DARK: Paint = Paint([66, 70, 76], Finish::Matte);
 
 const PRINTER_M: [f32; 3] = [0.5, 0.4, 0.39];
@@ -165,7 +165,7 @@ const PRINTER: ClassInfo = ClassInfo {
     parts: &in_meters(
         PRINTER_M,
         [
-            cuboid([0.0, 0.0, 0.03], [0.5, 0.25, 0.33], PRINTER_GREY),
+            cuboid([0.0, 0.0, 0.03], [0.5, 0.25, 0.33], PRINTER_GRAY),
             cuboid([0.0, 0.25, 0.03], [0.48, 0.06, 0.31], PRINTER_DARK),
             cuboid([0.0, 0.09, -0.135], [0.34, 0.08, 0.01], BLACK).non_colliding(),
             cuboid([0.0, 0.06, -0.145], [0.34, 0.02, 0.1], PRINTER_DARK).non_colliding(),

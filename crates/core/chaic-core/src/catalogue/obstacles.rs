@@ -11,7 +11,7 @@ pub(super) const CLASSES: &[ClassInfo] = &[TRASHBIN, BRIGHT_FIRE_EXTINGUISHER];
 const OBSTACLE: ClassInfo = ClassInfo { role: Role::Obstacle, ..FURNISHING };
 const PAPER: Paint = Paint([238, 236, 228], Finish::Matte);
 
-const BIN_GREY: Paint = Paint([142, 148, 152], Finish::Metal);
+const BIN_GRAY: Paint = Paint([142, 148, 152], Finish::Metal);
 
 const TRASHBIN_M: [f32; 3] = [0.48, 0.57, 0.48];
 const TRASHBIN: ClassInfo = ClassInfo {
@@ -24,7 +24,7 @@ const TRASHBIN: ClassInfo = ClassInfo {
     parts: &in_meters(
         TRASHBIN_M,
         [
-            round_tub([0.0, 0.0, 0.0], [0.46, 0.55, 0.46], 0.014, 0.76, BIN_GREY),
+            round_tub([0.0, 0.0, 0.0], [0.46, 0.55, 0.46], 0.014, 0.76, BIN_GRAY),
             ring([0.0, 0.545, 0.0], 0.48, 0.03, DARK_STEEL).non_colliding(),
             ring([0.0, 0.03, 0.0], 0.376, 0.03, DARK_STEEL).non_colliding(),
             cylinder([0.0, 0.02, 0.0], [0.36, 0.36, 0.36], BLACK).non_colliding(),

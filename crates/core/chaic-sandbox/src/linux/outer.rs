@@ -22,8 +22,8 @@ use super::{SetupError, SetupResult, print_error};
 use crate::policy::Policy;
 use crate::request::{Mode, Request, Stage};
 
-/// Interval of the memory and task checks. A process can write to about 200 MiB of new memory in
-/// it.
+/// Interval of the memory and task checks. Within one interval, a process can fill about 200 MiB of
+/// new memory.
 const CHECK_INTERVAL: Duration = Duration::from_millis(20);
 /// Exit status of a command that was killed at a limit, as a shell reports SIGKILL.
 const KILLED: u8 = 128 + 9;

@@ -332,7 +332,7 @@ impl Mount {
     }
 }
 
-/// Replaces the octal escapes that the kernel writes for blanks in paths.
+/// Replaces the octal escapes that the kernel writes for spaces in paths.
 fn unescape(text: &str) -> std::ffi::OsString {
     use std::os::unix::ffi::OsStringExt as _;
     let bytes = text.as_bytes();

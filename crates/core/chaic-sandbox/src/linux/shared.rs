@@ -11,8 +11,8 @@ const MAX_ENTRIES: usize = 10_000;
 
 /// Returns the access to the readable paths of a policy and to a private folder.
 ///
-/// Landlock cannot except a path below a readable folder. So the other entries of a folder that
-/// contains a masked path are readable, each by itself. The command cannot list such a folder.
+/// Landlock cannot exclude a path below a readable folder. In a folder that contains a masked path,
+/// each other entry is therefore readable by itself. The command cannot list such a folder.
 pub(super) fn access(policy: &Policy, scratch: PathBuf) -> Access {
     let masked: Vec<PathBuf> = policy.masked.iter().map(|path| resolve(path)).collect();
     let system = SYSTEM_FOLDERS.iter().chain(SYSTEM_FILES).map(Path::new);

@@ -13,7 +13,7 @@ pub(super) struct Usage {
     pub tasks: u64,
 }
 
-/// Maximum number of listed processes; a fork bomb exceeds any limit then.
+/// Maximum number of listed processes; a larger fork bomb exceeds the task limit anyway.
 const MAX_LISTED: usize = 100_000;
 
 /// Returns the memory and tasks of a process and all of its descendants.

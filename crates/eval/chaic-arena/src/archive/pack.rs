@@ -35,8 +35,8 @@ pub struct PackedArchive {
 /// files in which pip records where a package came from: they name paths of the author.
 ///
 /// # Errors
-/// [`ArenaError`](crate::ArenaError) if an entry is no regular file or folder, a name or size is not
-/// allowed in archives, the archive would lie inside the folder, or a file cannot be read or written.
+/// [`ArenaError`](crate::ArenaError) if an entry is no regular file or folder, or its name or size is
+/// not allowed. Also if the archive would lie in the folder, or a file cannot be read or written.
 pub fn pack(folder: &Path, archive: &Path) -> Result<PackedArchive> {
     if lies_inside(archive, folder) {
         let archive = archive.display();

@@ -216,7 +216,7 @@ fn checksum(header: &Header) -> u32 {
     sum(&bytes[..148]) + 8 * u32::from(b' ') + sum(&bytes[156..])
 }
 
-/// Returns why entries of this kind are refused.
+/// Returns the reason why entries of this kind are refused.
 fn refusal_of(kind: EntryType) -> String {
     let name = match kind {
         EntryType::Link => "a hard link",

@@ -11,9 +11,9 @@ use serde::Serialize;
 
 use super::{Leaderboard, LeaderboardRow, LeaderboardTable, RefusedEntry, RowDifference};
 
-/// The ending selects escaping for HTML.
+/// Name and text of the template. The ending of the name selects escaping for HTML.
 const TEMPLATE: (&str, &str) = ("leaderboard.html", include_str!("leaderboard.html"));
-/// Rules of this page, after those of all pages.
+/// Style of this page (CSS), after the style of all pages.
 const TABLE_STYLE: &str = include_str!("leaderboard.css");
 /// Digits of a code version in the page. The link to the JSON file has all.
 const VERSION_DIGITS: usize = 12;

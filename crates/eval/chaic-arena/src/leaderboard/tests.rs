@@ -1,5 +1,5 @@
-//! Promises: rows of different rules or partners are never in one table, a table with a list of partners ranks by the
-//! list, and texts of a submission cannot add markup.
+//! Promises: rows of different rules or partners are never in one table. A table with a list of partners ranks by the
+//! list. Texts of a submission cannot add markup.
 
 use chaic_core::TaskId;
 use chaic_core::capability::PersonChange;
@@ -368,7 +368,7 @@ fn repeated_and_contradictory_evaluations_are_refused() {
     assert!(contradictory.starts_with("obstacle/sealed/000 with none and seed 0 ends otherwise"));
 }
 
-/// A built-in helper may be submitted too. It plays as where it is the reference.
+/// A built-in helper may be submitted too; its results are those of the same reference helper.
 #[test]
 fn a_submitted_built_in_helper_plays_as_the_reference() {
     let unrestricted = rules("a", "unrestricted");

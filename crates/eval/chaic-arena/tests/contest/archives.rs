@@ -20,7 +20,7 @@ fn write_submission(at: &Path) {
     fs::write(at.join("helper/.lock"), "").expect("the disk has space");
 }
 
-/// Writes bytecode as Python does beside a module that it imports; it differs between times.
+/// Writes bytecode as Python does beside a module that it imports; the bytes differ each time.
 fn write_bytecode(helper: &Path, content: &str) {
     let folder = helper.join("__pycache__");
     fs::create_dir(&folder).expect("the disk has space");

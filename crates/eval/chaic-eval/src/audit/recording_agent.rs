@@ -37,7 +37,7 @@ pub(super) struct RecordedDecision {
 
 /// Briefing, observations and actions of an agent.
 #[derive(Debug, Default)]
-pub(super) struct Log {
+pub(super) struct ObservationLog {
     pub(super) briefing: Option<Briefing>,
     /// Decisions that are not compared yet.
     pub(super) decisions: VecDeque<RecordedDecision>,
@@ -48,10 +48,10 @@ pub(super) struct Log {
     remaining: Vec<(EntityId, ClassId)>,
 }
 
-impl Log {
+impl ObservationLog {
     /// Creates an empty log, with an artificial leak or without.
-    pub(super) fn with_leak(leak: Option<Leak>) -> Log {
-        Log { leak, ..Log::default() }
+    pub(super) fn with_leak(leak: Option<Leak>) -> ObservationLog {
+        ObservationLog { leak, ..ObservationLog::default() }
     }
 
     /// Reads the information of the artificial leak from the world.
@@ -102,11 +102,11 @@ impl Log {
 /// An agent with a log.
 pub(super) struct RecordingAgent {
     pub(super) agent: Box<dyn Agent>,
-    pub(super) log: Arc<Mutex<Log>>,
+    pub(super) log: Arc<Mutex<ObservationLog>>,
 }
 
 impl RecordingAgent {
-    fn log(&self) -> std::sync::MutexGuard<'_, Log> {
+    fn log(&self) -> std::sync::MutexGuard<'_, ObservationLog> {
         self.log.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -162,7 +162,7 @@ impl Summary {
 }
 
 impl Delivery {
-    /// Returns whether it counts as the helper's: released by the helper, or carried by both.
+    /// Returns whether the delivery counts for the helper: released by it, or carried by both.
     pub fn is_by_helper(&self) -> bool {
         self.by == AgentId::HELPER || self.together
     }

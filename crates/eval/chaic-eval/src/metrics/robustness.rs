@@ -204,10 +204,10 @@ fn linearized_ratio<'a>(gains: &Gains<'a>, ordinary: &Gains<'a>) -> Vec<(Episode
     gains.iter().map(value).collect()
 }
 
-/// Returns values whose mean is the mean of the worst tenth of the cells (conditional value at risk),
-/// and whose spread is that of this mean to first order: q − max(q − x, 0) / 0.1 for the gain x and
-/// the tenth percentile q (Rockafellar and Uryasev, "Optimization of Conditional Value-at-Risk", 2000,
-/// equation 4). If a tenth of the cells is no whole number, the last one counts as a fraction.
+/// Returns values whose mean is that of the worst tenth of the cells (conditional value at risk), and
+/// whose spread is that of this mean to first order. They are q − max(q − x, 0) / 0.1 for the gain x
+/// and the tenth percentile q (Rockafellar and Uryasev, "Optimization of Conditional Value-at-Risk",
+/// 2000, equation 4). If a tenth of the cells is no whole number, the last one counts as a fraction.
 fn linearized_tail(cells: Vec<(EpisodeKey<'_>, f64)>) -> Vec<(EpisodeKey<'_>, f64)> {
     let mut sorted: Vec<f64> = cells.iter().map(|(_, gain)| *gain).collect();
     sorted.sort_by(f64::total_cmp);

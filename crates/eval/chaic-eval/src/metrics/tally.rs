@@ -50,8 +50,8 @@ impl Escape {
         self.last_decision = frame;
     }
 
-    /// Returns all counted frames, including the frames from the last decision to the end, wherever
-    /// the child is then.
+    /// Returns all counted frames. The frames from the last decision to the end count if the child
+    /// ran then, even if it was not away.
     fn total(&self, end: Frame) -> u32 {
         let last = if self.is_running { end.saturating_sub(self.last_decision) } else { 0 };
         self.frames.saturating_add(last)

@@ -114,7 +114,7 @@ fn draw_rows(image: &mut RgbImage, [x, y, width]: [u32; 3], max_rows: usize, tex
     }
 }
 
-/// Returns as many words of a row as fit with `...` behind them.
+/// Returns as many words of a row as fit with `...` after them.
 fn shortened(row: &str, width_px: f32) -> String {
     let mut words: Vec<&str> = row.split(' ').filter(|word| !word.is_empty()).collect();
     loop {

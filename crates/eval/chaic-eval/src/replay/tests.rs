@@ -1,4 +1,4 @@
-//! Promises: an image shows the belief of the helper in free space, whatever its texts; a video begins
+//! Promises: an image shows the belief of the helper in free space, for any texts; a video begins
 //! with the first frame and ends with the last one.
 
 use chaic_core::agent::{PartnerBelief, Thought};

@@ -1,4 +1,4 @@
-//! Notes about missing episode runs, and about helpers that were played on different ones.
+//! Notes about missing episode runs, and about helpers with different episode runs.
 
 use std::collections::{BTreeMap, BTreeSet};
 

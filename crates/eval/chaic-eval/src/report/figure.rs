@@ -35,8 +35,8 @@ pub(super) fn figure_text(scores: &Scores, labels: Labels<'_>) -> Result<String>
 
 /// Returns the interval of [`shown_interval`], extended to contain the mean as figures require.
 pub fn drawn_interval(score: &Score) -> Option<[f64; 2]> {
-    // The interval is of sums over environments. Equal rates give it no width, and its rounding
-    // may then differ from that of the mean.
+    // The interval is computed from sums over environments. With equal rates its width is 0, and
+    // its rounding may differ from that of the mean.
     shown_interval(score).map(|[low, high]| [low.min(score.tr), high.max(score.tr)])
 }
 

@@ -7,7 +7,7 @@ use chaic_world::Setup;
 
 /// Returns the name of an episode's environment. A generated episode has it in its metadata. Other
 /// indoor episodes share an environment if walls and fixed furniture are equal. Another outdoor
-/// episode is its own environment, because outdoor layouts have no distinctive parts; if only its
+/// episode is its own environment, because outdoor layouts have no distinctive parts. If only its
 /// partner was changed, it has the environment of the generated episode.
 pub(crate) fn environment(episode: &Episode) -> String {
     let setup = episode.setup();

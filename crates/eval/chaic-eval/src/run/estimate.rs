@@ -10,18 +10,18 @@ use chaic_env::RunKey;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Estimate {
     unfinished: BTreeMap<(TaskId, String), u32>,
-    by_task_and_helper: BTreeMap<(TaskId, String), Times>,
-    by_helper: BTreeMap<String, Times>,
-    all: Times,
+    by_task_and_helper: BTreeMap<(TaskId, String), TimeSum>,
+    by_helper: BTreeMap<String, TimeSum>,
+    all: TimeSum,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
-struct Times {
+struct TimeSum {
     n: u32,
     sum: Duration,
 }
 
-impl Times {
+impl TimeSum {
     fn add(&mut self, time: Duration) {
         self.n += 1;
         self.sum += time;
@@ -66,7 +66,7 @@ impl Estimate {
         let (mut sum, mut longest) = (Duration::ZERO, Duration::ZERO);
         for (group, n) in self.unfinished.iter().filter(|(_, n)| **n > 0) {
             let known = self.by_task_and_helper.get(group).or_else(|| self.by_helper.get(&group.1));
-            let one = known.and_then(Times::mean).unwrap_or(all);
+            let one = known.and_then(TimeSum::mean).unwrap_or(all);
             sum += one * *n;
             longest = longest.max(one);
         }

@@ -26,9 +26,9 @@ use crate::report::{Report, write_files};
 /// Maximum size of the commands of a run, bytes, as in `chaic-subprocess`.
 const MAX_COMMANDS_BYTES: u64 = 1 << 20;
 
-/// Every `count`-th episode of a plan, from one of them on, with all helpers; each seed counts as an
-/// episode. The folder of a shard does not record the shard; it holds an unfinished run that can be
-/// resumed as a whole.
+/// Part of a plan: every `count`-th episode from episode `number` on, with all helpers. Each seed
+/// counts as an episode. The folder of a shard does not record the shard; it holds an unfinished run
+/// that can be resumed as a whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
     number: u32,
@@ -78,9 +78,9 @@ impl FromStr for Shard {
 /// same merge can be repeated.
 ///
 /// # Errors
-/// If the parts are of different runs, episode files, commands of helpers or files that these name; if
-/// they have different results of an episode run, or helpers that query language models; if a finished
-/// episode run has no trace; if files can't be read or written.
+/// If the parts differ in the run, episode files, commands of helpers, files that these name, or
+/// results of an episode run. Also if a helper queries a language model, a finished episode run has no
+/// trace, or a file cannot be read or written.
 pub fn merge(out: &Path, parts: &[PathBuf]) -> Result<Run> {
     let Some(first) = parts.first() else {
         return Err(EvalError::Options("name the runs to merge".to_owned()));

@@ -27,7 +27,7 @@ const HORIZON: u32 = 90;
 /// Side of the images, pixels.
 const SIZE: u32 = 32;
 
-/// Agent that turns round and attempts impossible actions.
+/// Agent that turns in place and attempts impossible actions.
 struct Turner {
     turns: u32,
 }

@@ -27,11 +27,11 @@ pub(super) const CABINETS: usize = 4;
 /// Class of the furniture whose tops hold high objects indoors (ours: objects on the goal place
 /// could be delivered without a step).
 const HIGH_HOST: &str = "cabinet";
-/// Class of the goal place of all indoor tasks (ours: the paper's high goal places are cabinets and
-/// refrigerators, but a class that is disclosed must not reveal the task).
+/// Class of the goal place of all indoor tasks. Ours: the paper's high goal places are cabinets and
+/// refrigerators, but a class that is disclosed must not reveal the task.
 const GOAL_CLASS: &str = "refrigerator";
-/// Height of refrigerators relative to the catalogue's: 2.05 m, as high as the cabinets that are
-/// mostly the high goal place in the paper, so that the task is as hard.
+/// Height of refrigerators relative to the catalogue's: 2.05 m. Most high goal places of the paper
+/// are cabinets of this height, so the task is equally hard.
 const TALL_SCALE: f32 = 1.15;
 /// Height of the low refrigerator relative to the catalogue's: 0.85 m, as high as a kitchen
 /// counter.
@@ -72,14 +72,14 @@ impl Inventory {
     }
 }
 
-/// Which objects may be selected for a location.
+/// Objects that may be selected for a location.
 #[derive(Clone, Copy, Debug)]
 enum Selection {
     /// Targets and distractors: the partner can reach them there.
     Any,
-    /// Distractors only: the partner cannot reach them, and the task is not about that.
+    /// Distractors only: the partner cannot reach them, and the task is not about reach.
     Distractors,
-    /// This number of targets: the partner cannot reach them, and that is the task.
+    /// This number of targets: the task is that the partner cannot reach them.
     Targets(usize),
 }
 
@@ -175,7 +175,7 @@ fn select_objects(
     rng: &mut RngStream,
 ) -> Option<Vec<ClassId>> {
     let mut left = match selection {
-        // Targets and distractors alike.
+        // Any mix of targets and distractors.
         Selection::Any => [n, n],
         Selection::Distractors => [0, n],
         Selection::Targets(n_targets) => [n_targets.min(n), n - n_targets.min(n)],

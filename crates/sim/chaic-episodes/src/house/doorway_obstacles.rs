@@ -8,8 +8,8 @@ use super::House;
 use super::layout::DOOR_M;
 use crate::upright_box::{UprightBox, mm, mm3, plan_bounds};
 
-/// Free width beside an obstacle, meters: more than the 0.40 of a walker, less than the 0.70 of a
-/// wheelchair, with a margin for a planning grid of 0.1 m.
+/// Free width beside an obstacle, meters. A walker needs 0.40 and a wheelchair 0.70. The margin is
+/// for a planning grid of 0.1 m.
 const GAP_M: [f32; 2] = [0.56, 0.66];
 /// Minimum and maximum number of obstacles of an episode (facts S7 for the maximum; the minimum is
 /// ours).
@@ -40,7 +40,7 @@ pub(super) fn obstacles(
         order.sort_by_key(|d| !house.is_spanning[*d]);
         order.truncate(n);
         let reached = reachable_rooms(house, from, &order);
-        // A path to the goal counts as two rooms.
+        // A reachable goal counts as two rooms.
         let open = reached.iter().filter(|r| **r).count() + if reached[to] { 2 } else { 0 };
         if best.as_ref().is_none_or(|(fewest, _)| open < *fewest) {
             best = Some((open, order));

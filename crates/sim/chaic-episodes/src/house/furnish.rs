@@ -11,8 +11,8 @@ use crate::Settings;
 use crate::free_space::FreeSpace;
 use crate::upright_box::UprightBox;
 
-/// Minimum number of slots for small objects on low furniture: 32 objects and 6 containers, with a
-/// choice.
+/// Minimum number of slots for small objects on low furniture: 32 objects, 6 containers and 8
+/// spare ones.
 const MIN_LOW_SLOTS: usize = 46;
 
 const WALL_COLORS: [[u8; 3]; 8] = [

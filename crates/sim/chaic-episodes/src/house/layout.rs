@@ -37,9 +37,9 @@ pub(super) struct Cut {
 pub(super) struct Door {
     /// Same as [`Cut::axis`].
     pub axis: usize,
-    /// Position of the wall on its normal axis.
+    /// Position of the wall on its normal axis, meters.
     pub at: f32,
-    /// Center along the wall.
+    /// Center along the wall, meters.
     pub middle: f32,
     /// Rooms on its two sides.
     pub rooms: [usize; 2],
@@ -70,9 +70,9 @@ impl Door {
 /// Rooms, walls and doorways without furniture.
 #[derive(Clone, Debug)]
 pub(super) struct Plan {
-    /// Outline through the middles of the outer walls.
+    /// Outline along the center lines of the outer walls, meters.
     pub outer: Rect,
-    /// Outlines through the middles of their walls.
+    /// Kind of each room, and its outline along the center lines of its walls, meters.
     pub rooms: Vec<(RoomKind, Rect)>,
     pub doors: Vec<Door>,
     pub cuts: Vec<Cut>,

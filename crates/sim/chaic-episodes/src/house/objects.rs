@@ -6,8 +6,8 @@ use chaic_core::rng::RngStream;
 use chaic_core::task::Arrangement;
 use chaic_core::{ClassId, TaskId};
 
-/// Target sets with the classes to which objects are dealt in turn. The iPhone is listed twice, as
-/// in the original (facts S11.2), so that it is more frequent.
+/// Target sets with their entries, among which the objects of a set are divided evenly. The iPhone
+/// has two entries, as in the original (facts S11.2), so it is more frequent.
 const SETS: [(TargetSet, &[&str]); 4] = [
     (TargetSet::Fruit, &["apple", "banana", "orange"]),
     (TargetSet::Bread, &["bread", "burger", "loaf_bread"]),
@@ -66,8 +66,8 @@ fn deal(rng: &mut RngStream, names: &[&str]) -> Vec<(ClassId, u32)> {
     counts
 }
 
-/// Draws the containers of an episode with `n_places` places for them (facts S11.2): all six if
-/// they fit; else three of one kind and the remainder of the other.
+/// Draws the containers of an episode with `places` places for them (facts S11.2): all six if they
+/// fit. Otherwise three are of one kind, and the others of the other kind.
 pub(super) fn containers(rng: &mut RngStream, places: usize) -> Vec<ClassId> {
     let (mut first, mut second) = (DISHES, BASKETS);
     if rng.chance(0.5) {

@@ -7,7 +7,7 @@ use super::room::{Piece, RoomPlan, Side, Spot};
 
 /// Depth in front of a piece that is needed to open it, meters.
 const OPEN_M: f32 = 0.75;
-/// Fraction of a room's floor under furniture at which it no longer looks empty.
+/// Fraction of a room's floor under furniture from which the room no longer looks empty.
 const MAX_FILLED_FRACTION: f32 = 0.17;
 /// Maximum number of pieces that are added to an empty-looking room.
 const MAX_FILLERS: usize = 5;

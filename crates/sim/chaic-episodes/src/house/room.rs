@@ -56,15 +56,15 @@ pub(super) enum Spot {
     Free,
 }
 
-/// A wall of a room, by the yaw of furniture with its back to it.
+/// A wall of a room, as the number of quarter turns of furniture with its back to the wall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Side(pub u8);
 
 impl Side {
     pub const ALL: [Side; 4] = [Side(0), Side(1), Side(2), Side(3)];
 
-    /// Returns the yaw of furniture with its back to this wall: side 0 is at the largest z, and
-    /// each next one is a quarter turn to the left.
+    /// Returns the yaw of furniture with its back to this wall. Side 0 is at the largest z, and
+    /// each next side is a quarter turn to the left.
     fn yaw_rad(self) -> f32 {
         [0.0, FRAC_PI_2, PI, -FRAC_PI_2][usize::from(self.0 % 4)]
     }

@@ -29,7 +29,7 @@ const LOW_M: f32 = 1.2;
 /// Tops from this height on are high, meters (facts S11.1).
 pub(super) const HIGH_M: f32 = 1.5;
 /// Maximum distance from the center of a slot to a cell in which a wide body can stand, meters. An
-/// arm reaches 0.7 from there to the nearest point, and a wheelchair stands 0.05 nearer.
+/// arm reaches 0.7 m from there, and a wheelchair can stand 0.05 m nearer.
 const REACH_M: f32 = 0.70;
 /// Gap between objects on one surface, meters.
 const APART_M: f32 = 0.015;

@@ -43,7 +43,7 @@ fn check_overlaps(
             let problem = "is more than 40 m outside the bounds";
             found.push(Problem::new(object_field(setup, i, "position"), problem));
         }
-        // Fixed furniture of other sources may intersect, which affects the looks only.
+        // Fixed furniture of other sources may intersect, which affects the appearance only.
         let may_cut = |object: &ObjectSpec| strictness == Strictness::Playable && object.fixed;
         if !may_cut(object)
             && let Some(w) =

@@ -57,8 +57,8 @@ impl World {
         StepProgress::Instant
     }
 
-    /// Calls the agent that last chose the same piece of furniture. It aborts its action and walks
-    /// to the furniture too ([`JointLift::LastChoice`](crate::JointLift)).
+    /// Calls the agent that last chose the same piece of furniture. That agent aborts its action
+    /// and walks to the furniture too ([`JointLift::LastChoice`](crate::JointLift)).
     pub(super) fn call_partner_to_lift(&mut self, agent: AgentId, action: ResolvedAction) {
         let Action::PickUp { object, .. } = action else { return };
         if self.object(object).0.class.info().role != Role::HeavyTarget {

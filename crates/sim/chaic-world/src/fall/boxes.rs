@@ -1,6 +1,6 @@
 //! Collision queries between boxes and the ground. The dispatcher of parry links the code of all pairs
 //! of shapes, which would enlarge the module for browsers. This one calls the same functions for the
-//! two pairs that falls have, so that results are bit-identical.
+//! two pairs that occur in falls, so results are bit-identical.
 
 use rapier3d::geometry::{ContactData, ContactManifold, ContactManifoldData};
 use rapier3d::math::{Pose, Real, Vector};

@@ -104,7 +104,7 @@ fn objects_are_put_on_the_highest_top_beside_each_other() {
     assert!(apart >= radii[0] + radii[1], "{apart} m apart");
 }
 
-/// Removes a trash bin in an open room with one door on a side of the person; returns its new position
+/// Removes a trash bin in an open room with one door on a side of the person. Returns its new position
 /// relative to the person, its radius, and the radius of the person.
 fn removed_beside_door(door: Vec2) -> (Vec2, f32, f32) {
     let people = vec![person(Persona::Wheelchair, 9.0, 9.0), person(Persona::Helper, 0.0, 0.0)];

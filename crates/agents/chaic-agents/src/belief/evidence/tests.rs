@@ -108,7 +108,7 @@ fn a_person_who_passes_a_lying_object_does_not_hold_it() {
         observer.observe(frame, &[partner(x, -3.0), apple([0.0, 0.8, -3.0])]);
         assert_eq!(observer.strength(APPLE), Some(0.4), "{x}");
     }
-    // Alone, it lies where it lay.
+    // Seen alone, it still lies at its place.
     observer.observe(150, &[partner(2.0, -3.0), apple([0.0, 0.8, -3.0])]);
     assert_eq!(observer.strength(APPLE), None);
     let top_m = observer.evidence.lying_top_m(APPLE).expect("it was seen lying");

@@ -183,7 +183,7 @@ fn a_taken_vase_makes_fragile_targets_likely() {
 fn a_failed_attempt_counts_like_a_certain_take_of_that_object() {
     let mut fails = evidence_with(|e| e.failed = vec![failed(20, "apple", 1.0)]);
     let once = belief_of(&fails).set_probabilities();
-    // The constraint changes as well, and with it the prior of fragile targets, but hardly.
+    // The constraint changes as well, and the prior of fragile targets only slightly.
     let take = belief_of(&takes(20, &[("apple", 1.0)])).set_probabilities();
     assert!(once.iter().zip(&take).all(|(a, b)| (a.1 - b.1).abs() < 0.01), "{once:?} {take:?}");
     fails.failed.push(failed(20, "apple", 1.0));

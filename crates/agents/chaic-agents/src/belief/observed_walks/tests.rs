@@ -80,7 +80,7 @@ fn a_walk_towards_the_apple_does_not() {
     let mut observer = Observer::new(&fruit()[..1]);
     observer.walk(0, &[0.0, 1.0, 2.0]);
     assert!(observer.walks.frames.is_empty());
-    // Neither does passing it within reach.
+    // A walk that passes the apple within reach does not count either.
     let mut observer = Observer::new(&fruit()[..1]);
     observer.walk(0, &[3.2, 4.1]);
     assert_eq!(observer.frames(&["apple"]), 0.0);

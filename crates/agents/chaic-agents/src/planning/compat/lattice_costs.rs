@@ -12,15 +12,15 @@ use crate::planning::cost_map::{CostMap, FREE, UNKNOWN_EXTRA};
 use crate::planning::cost_model::{CostInputs, CostModel, MapChanges};
 use crate::track::TrackId;
 
-/// Cell within two cells of something, and adjacent to it.
+/// Costs of a cell within two cells of an occupied one, and of a cell adjacent to one.
 const NEAR: [u32; 2] = [5 * FREE, 10 * FREE];
-/// Occupied cell.
+/// Cost of an occupied cell.
 const OCCUPIED: u32 = 1_000 * FREE;
 /// The same in the first frames of an episode.
 const OCCUPIED_AT_FIRST: u32 = 500_000 * FREE;
-/// Duration of that period, frames.
+/// Number of these first frames.
 const FIRST_FRAMES: Frame = 200;
-/// Added for a wall.
+/// Extra cost of a wall.
 const WALL_EXTRA: u32 = 500_000 * FREE;
 /// Added for cells once seen as tall as only walls are. They stay walls even if their floor is seen
 /// later.
@@ -83,7 +83,7 @@ impl LaggedOccupancy {
 }
 
 /// Observed cells of removable obstacles. The observed center of an obstacle moves with
-/// the viewpoint, and each of its cells stays in the map for as long as the obstacle is in place
+/// the viewpoint. Each of its cells stays in the map while the obstacle is in place
 /// (facts A1.3, A1.8).
 #[derive(Clone, Debug, Default)]
 struct ObservedObstacles(BTreeMap<TrackId, BTreeSet<usize>>);

@@ -256,7 +256,7 @@ fn a_pick_is_switched_only_for_a_gain() {
     episode.step(200, &[bed(), apple(), banana()]);
     assert!(episode.policy.supersedes(&to_banana, &to_apple));
     assert!(!episode.policy.supersedes(&to_apple, &to_apple), "the same object");
-    // Once planned, it is no gain any more.
+    // Once it is planned, it is no further gain.
     episode.step(300, &[bed(), apple(), banana()]);
     assert!(!episode.policy.supersedes(&to_banana, &to_apple));
     // A delivery interrupts a walk. Idle plans replace each other, but not themselves.

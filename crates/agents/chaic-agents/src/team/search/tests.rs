@@ -110,13 +110,13 @@ fn operations_without_effect_are_removed_and_useful_ones_stay() {
         assert!(simulate(&problem, &cleaned) >= simulate(&problem, operations));
         cleaned
     };
-    // Nothing to deliver yet; the last delivery happens by itself.
+    // Nothing to deliver yet; the last delivery needs no operation.
     assert_eq!(clean(&[Deliver, PickUp(0), Deliver, Deliver]), [PickUp(0)]);
     // Nobody wants the object at place 3.
     assert_eq!(clean(&[PickUp(0), PickUp(3)]), [PickUp(0)]);
     assert_eq!(clean(&[PickUp(0), PickUp(0)]), [PickUp(0)]);
     assert_eq!(clean(&[TakeContainer(4), PickUp(0)]), [PickUp(0)]);
-    // The first object arrives at 286 instead of 764 by the delivery on the way.
+    // With the delivery on the way, the first object arrives at frame 286 instead of 764.
     let useful = [PickUp(0), Deliver, PickUp(1)];
     assert_eq!(clean(&useful), useful);
     assert!(clean(&[]).is_empty());

@@ -205,7 +205,7 @@ fn parts_with_other_episodes_or_results_are_refused() {
     fs::write(&copy, text.replacen("\"split\": \"short\"", "\"split\": \"other\"", 1)).unwrap();
     assert_ne!(fs::read_to_string(&copy).unwrap(), text);
     assert!(refused().contains("have other episode files"));
-    // An episode less.
+    // One episode is missing.
     fs::remove_file(&copy).unwrap();
     assert!(refused().contains("have other episode files"));
     fs::write(&copy, text).unwrap();

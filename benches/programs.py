@@ -1,4 +1,4 @@
-"""Programs for the scripts of these folders: from the folder BIN, or built here."""
+"""Programs for the scripts in `benches`: from the folder in the environment variable BIN, or built by cargo."""
 
 import contextlib
 import os

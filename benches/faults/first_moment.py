@@ -140,7 +140,7 @@ def kill_everywhere(args, chaic, model_options):
             print(f"killed at {name} {k}: {problem}", flush=True)
     left = ", ".join(f"{state} {n}" for state, n in sorted(states.items()))
     print(f"system calls: {len(calls)}; killed: {killed}; left behind: {left}; failures: {failures}")
-    # Without a kill nothing was tested.
+    # If no run was killed, nothing was tested.
     return 1 if failures or not killed else 0
 
 

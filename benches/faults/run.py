@@ -48,7 +48,7 @@ def arguments():
 def play(chaic, standin, args, kind):
     """Plays a run under one kind of fault; returns the results of its episodes."""
     out = args.out / kind
-    # Otherwise the results of an earlier call would be counted.
+    # Removes the run of an earlier call, whose results would be counted.
     remove_run(out)
     config = args.out / "timeouts.toml"
     config.write_text(CONFIG)

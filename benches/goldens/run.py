@@ -34,7 +34,7 @@ class Target:
     """Build and run settings of a processor."""
 
     triple: str
-    programs: dict[str, str] = field(default_factory=dict)  # required program: how to install it
+    programs: dict[str, str] = field(default_factory=dict)  # required program -> how to install it
     environment: dict[str, str] = field(default_factory=dict)
     runner: list[str] = field(default_factory=list)
     suffix: str = ""

@@ -90,7 +90,7 @@ def arguments():
 
 
 def copy_checkout(to):
-    """Makes a folder equal to the committed and changed files of the checkout, for cargo as new as needed."""
+    """Makes a folder equal to the committed and changed files of the checkout. Changed files get a new modification time."""
     listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
     names = subprocess.run(listed, cwd=ROOT, check=True, capture_output=True).stdout.decode().split("\0")
     files = {name for name in filter(None, names) if (ROOT / name).is_file()}
@@ -99,7 +99,7 @@ def copy_checkout(to):
             path.unlink()
     for name in files:
         source, copy = ROOT / name, to / name
-        # An interrupted run leaves a changed file, which has to become new again.
+        # An interrupted run leaves a mutated file, which must be replaced by the original.
         if not copy.is_file() or not filecmp.cmp(source, copy, shallow=False):
             copy.parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(source, copy)

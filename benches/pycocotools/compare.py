@@ -45,7 +45,7 @@ def main(folder: str, report_path: str) -> int:
     precision = evaluation.eval["precision"][:, :, :, :, 0]
 
     def mean(values):
-        """The mean, or None if no class has instances, as in chaic's report."""
+        """Returns the mean, or None if no class has instances, as in chaic's report."""
         return float(np.mean(values[values > -1])) if (values > -1).any() else None
 
     names = {c["id"]: c["name"] for c in truth.dataset["categories"]}

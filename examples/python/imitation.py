@@ -49,7 +49,7 @@ def export(name: str, path: Path) -> None:
 
 
 class Imitator(nn.Module):
-    """Predicts the kind of action from depth and own state."""
+    """Predicts the kind of action from depth and proprioception."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -25,7 +25,7 @@ ROLLOUT, EPOCHS, MINIBATCH = 256, 4, 64
 
 
 class Flat(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Flattens own state and plans into one vector, with the mask of the offered plans."""
+    """Flattens proprioception and plans into one vector, with the mask of the offered plans."""
 
     def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
         super().__init__(env)

@@ -1,4 +1,4 @@
-"""PPO in one file (after CleanRL, Huang et al. 2022) on the vector environment: own state only, all eight tasks.
+"""PPO in one file (after CleanRL, Huang et al. 2022) on the vector environment: proprioception only, all eight tasks.
 
     pip install '.[gym]' torch
     python examples/python/ppo_vector.py --steps 200000

@@ -10,8 +10,8 @@ import random
 
 from chaic_helper import serve
 
-NEAR_M = 1.2  # Distance from which it picks up or puts on, meters.
-BLOCKED_M = 0.6  # Depth ahead below which the path is blocked, meters.
+NEAR_M = 1.2  # Maximum distance at which the helper picks up or puts on objects, meters.
+BLOCKED_M = 0.6  # The path ahead is blocked if the depth is below this, meters.
 SIZE = 64  # Requested image size, pixels; `chaic eval --size` overrides it.
 
 

@@ -96,7 +96,7 @@ def readable(maker: Callable[[], Any]) -> list[str]:
         path = Path(file).absolute()
         found.add(str(path.parent if package and not is_too_wide(path.parent) else path))
     main_file = _main_file()
-    # The process runs the script only to import from it.
+    # The process runs the script only to import the helper from it.
     if main_file is not None and b"__main__" in _pickled(maker):
         found.add(main_file)
     return sorted(found)

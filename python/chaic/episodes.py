@@ -17,7 +17,7 @@ MAX_CACHED = 256
 #: Training split of tasks without bundled training episodes.
 FALLBACK_SPLIT = "gen:0..1000"
 
-#: Drawn seeds of worlds are below this number.
+#: Upper bound (exclusive) of the drawn seeds of worlds.
 N_SEEDS = 2**31
 
 #: Largest seed of a world.

@@ -187,7 +187,7 @@ class HelperEnv(Recreated, gymnasium.Env[Any, Any]):
 
     def _step_plan(self, action: Any) -> float:
         assert self._planner is not None
-        # Policies may return an array without dimensions.
+        # Policies may return a zero-dimensional array instead of an integer.
         try:
             index = operator.index(action)
         except TypeError:
@@ -246,7 +246,7 @@ class HelperEnv(Recreated, gymnasium.Env[Any, Any]):
             plans = np.zeros((spaces.MAX_PLANS, vectors.shape[1]), np.float32)
             plans[: len(vectors)] = vectors
             out["plans"] = plans
-        # A caller may change what it gets.
+        # Returns a copy, because a caller may change the array.
         self._last = {part: array.copy() for part, array in out.items()}
         return out
 

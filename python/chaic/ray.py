@@ -62,7 +62,7 @@ def _play_missing(ray: Any, start: Callable[[int], Any], folders: Mapping[int, P
                 try:
                     data = ray.get(reference)
                 except (ray.exceptions.RayError, OSError) as error:
-                    # Another try of a call with wrong arguments fails as well.
+                    # A call with wrong arguments would fail again, so it is not repeated.
                     if isinstance(error, (ValueError, TypeError)):
                         raise
                     remaining_tries[k] -= 1
@@ -76,7 +76,7 @@ def _play_missing(ray: Any, start: Callable[[int], Any], folders: Mapping[int, P
                     _unpack(data, folders[k])
                     del remaining_tries[k]
     except BaseException:
-        # Also after Ctrl-C: the tasks would otherwise occupy the cluster.
+        # Cancels the tasks, also after Ctrl-C. Otherwise they would occupy the cluster.
         for other in pending:
             ray.cancel(other, force=True)
         raise
@@ -86,7 +86,7 @@ def _remove_unfinished(parts: Path) -> None:
     """Removes incomplete shards, and the folder of the shards if it has no others."""
     for folder in parts.glob("*.unfinished"):
         shutil.rmtree(folder, ignore_errors=True)
-    # The folder of finished shards is not empty.
+    # `rmdir` fails if there are finished shards, which stay.
     with suppress(OSError):
         parts.rmdir()
 
@@ -124,7 +124,7 @@ def evaluate(
         ray.init()
     parts = Path(f"{out}.shards")
     if shards is None:
-        # After an interruption the cluster can have another size.
+        # After an interruption, the cluster can have another size. The number of shards must not change.
         earlier = {int(folder.name.split("-of-")[1]) for folder in parts.glob("*-of-*[0-9]")}
         shards = earlier.pop() if len(earlier) == 1 else None
     if shards is None:

@@ -375,7 +375,7 @@ class Run:
     def _repr_html_(self) -> str:
         try:
             text = self.report()
-        except RuntimeError as error:  # For example a run without finished episodes.
+        except RuntimeError as error:  # The command fails for example for a run without finished episodes.
             text = f"{self!r}: {error}"
         return f"<pre>{html.escape(text)}</pre>"
 

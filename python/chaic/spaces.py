@@ -21,7 +21,7 @@ DEFAULT_PARTS = ("rgb", "depth", "proprioception")
 MAX_DEPTH_M = 100.0
 #: Bound of positions relative to the origin of the world or to a body, meters.
 MAX_COORDINATE_M = 1000.0
-#: Maximum number of offered plans; further ones are dropped. Those of the standard split are at most 52: a target for each of
+#: Maximum number of offered plans; further plans are dropped. The standard split has at most 52 plans: a target for each of
 #: 33 objects, six containers, seven obstacles, and six plans without an object.
 MAX_PLANS = 64
 #: Semantic map: cells along each side, and the size of a cell, meters.

@@ -12,7 +12,7 @@ from chaic._chaic import Briefing, Observation
 
 #: Interval of the checks, seconds.
 _INTERVAL_S = 0.1
-#: Interval between the exceptions of a call that catches them, seconds.
+#: Interval between repeated exceptions in a call that catches them, seconds.
 _REPEAT_S = 1.0
 
 
@@ -66,7 +66,7 @@ class Watchdog:
             self._deadlines[thread] = time.monotonic() + self._limit_s
         result: Any = None
         error: BaseException | None = None
-        # The exception may come anywhere until the deadline is gone.
+        # The exception may be raised anywhere until the deadline is removed.
         try:
             try:
                 result = function(*arguments)
@@ -74,12 +74,12 @@ class Watchdog:
                 error = raised
             is_expired = self._end(thread)
         except _TimeLimitExceeded:
-            # The interrupted end may have removed the thread from the expired ones already.
+            # The interrupted `_end` may already have removed the thread from the expired threads.
             self._end(thread)
             is_expired = True
         if is_expired:
             problem = TimeoutError(f"{name} took longer than {self._limit_s:g} s")
-            # The traceback shows where the call was.
+            # The traceback shows the code that the call was executing.
             raise problem.with_traceback(None if error is None else error.__traceback__) from None
         if error is not None:
             raise error

@@ -26,7 +26,7 @@ AGENTS: tuple[str, ...] = ("partner", "helper")
 
 
 def _copy(observation: Obs) -> Obs:
-    """Returns a copy, which the caller may change."""
+    """Returns a copy that the caller may change."""
     return {part: array.copy() for part, array in observation.items()}
 
 
@@ -320,7 +320,7 @@ class PairParallelEnv(_PairBase, ParallelEnv[str, Obs, Any]):
         ended = not waiting
         complete = bool(world.score()["complete"])
         is_cut = self.max_cycles is not None and self._steps >= self.max_cycles
-        # The last step pays what a running action has earned so far.
+        # The last step returns the reward that a running action has earned so far.
         rewarded = range(len(AGENTS)) if ended or is_cut else waiting
         rewards = dict.fromkeys(AGENTS, 0.0)
         rewards |= {AGENTS[agent_id]: self._pair.reward(agent_id) for agent_id in rewarded}

@@ -1,9 +1,9 @@
-// How much of a replay is verified.
+// Badge: fraction of a replay that is verified.
 
 import { html, type TemplateResult } from "lit";
 import type { ReplayInfo } from "./messages.js";
 
-/** Tells how many decisions of a replay agree with its re-simulation. */
+/** Shows how many decisions of a replay agree with its re-simulation. */
 export function badge(info: ReplayInfo): TemplateResult {
   const verified = info.n_verified === info.n_decisions;
   return html`<span class="badge ${verified ? "good" : "bad"}">

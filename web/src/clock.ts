@@ -1,4 +1,4 @@
-// Position in a replay: playing, pausing and stepping. Elements that show replays own one.
+// Position in a replay: playing, pausing and stepping. Each element that shows replays owns a clock.
 
 import type { ReactiveController, ReactiveControllerHost } from "lit";
 import { nearest } from "./frames.js";
@@ -22,7 +22,7 @@ export class PlaybackClock implements ReactiveController {
   private lastTime = 0;
   private position = 0;
 
-  /** `draw` shows a frame; `isBusy` tells whether the last one is still drawn, so that playing skips frames. */
+  /** `draw` shows a frame. `isBusy` returns whether a frame is still being drawn; playing then skips frames. */
   constructor(
     private readonly host: ReactiveControllerHost,
     private readonly draw: (frame: number) => void,
@@ -67,7 +67,7 @@ export class PlaybackClock implements ReactiveController {
   /** Handles the keys of a replay. */
   press(event: KeyboardEvent): void {
     const target = event.composedPath()[0] as HTMLElement;
-    // Many layouts have brackets on the third level, whose key counts as Alt, or as Ctrl and Alt.
+    // Many keyboard layouts have brackets behind AltGr, which counts as Alt, or as Ctrl and Alt.
     const isBracket = event.altKey && ["[", "]"].includes(event.key);
     const isShortcut = event.metaKey || ((event.ctrlKey || event.altKey) && !isBracket);
     if (isShortcut || target.matches("select, input")) return;
@@ -98,8 +98,8 @@ export class PlaybackClock implements ReactiveController {
 
   private advance(time: number): void {
     if (!this.isPlaying || !this.frames) return;
-    // A tab in the background gets no callbacks; the replay goes on where it was.
-    // The time of a callback can be before the press that started the replay.
+    // A tab in the background gets no callbacks; afterwards the replay continues where it was. The
+    // time of a callback can be earlier than the key press that started the replay.
     const elapsed = Math.max(0, Math.min(time - this.lastTime, 250)) / 1000;
     this.lastTime = time;
     this.position += elapsed * this.speed * this.frames.perSecond;

@@ -60,7 +60,7 @@ export class ChaicCompare extends LitElement {
     this.sources?.forEach((source, run) => this.open(run, source));
   }
 
-  /** Shows a frame and stops; as the first one if the replays are not verified yet. */
+  /** Shows a frame and stops. If the replays are not verified yet, it is the first frame shown. */
   seek(frame: number): void {
     if (!this.infos[0] || !this.infos[1]) this.start = frame;
     this.playback.seek(frame);
@@ -263,7 +263,7 @@ function trails(runs: [ReplayInfo, ReplayInfo], frame: number): TemplateResult {
     return svg`<polyline class="a${agent} run${run}" points=${points.join(" ")}></polyline>
       <circle class="a${agent} run${run}" cx=${x} cy=${y} r="0.012"></circle>`;
   };
-  // Coordinates are widths of the map; the SVG has its width and any height.
+  // Coordinates are in map widths; the SVG has the width of the map and an arbitrary height.
   return html`<svg class="trails" viewBox="0 0 1 4" preserveAspectRatio="xMidYMin slice" aria-hidden="true">
     ${runs.flatMap((info, run) => [PARTNER, HELPER].map((agent) => line(info, run, agent)))}
   </svg>`;

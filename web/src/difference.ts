@@ -10,7 +10,7 @@ export interface FirstDifference {
 
 /** Returns the first differing decision of two runs; undefined if their decisions are equal. */
 export function firstDifference(a: ReplayInfo, b: ReplayInfo): FirstDifference | undefined {
-  // Only agents that both runs have: the presence of a helper is no decision.
+  // Compares only agents that both runs have, because the presence of a helper is no decision.
   const common = (info: ReplayInfo, other: ReplayInfo): DecisionLine[] =>
     info.decisions.filter((line) => other.agents.some((agent) => agent.id === line.agent));
   const [first, second] = [common(a, b), common(b, a)];
@@ -24,7 +24,7 @@ export function firstDifference(a: ReplayInfo, b: ReplayInfo): FirstDifference |
   return undefined;
 }
 
-/** Returns what is delivered at a frame. */
+/** Returns the delivered value at a frame. */
 export function doneAt(deliveries: Delivery[], frame: number): number {
   return deliveries.filter((delivery) => delivery.frame <= frame).at(-1)?.done ?? 0;
 }

@@ -6,7 +6,7 @@ export function clock(frame: number, framesPerSecond: number): string {
   return `${Math.floor(seconds / 60)}:${String(seconds % 60).padStart(2, "0")}`;
 }
 
-/** Says which part of the value of the goal is delivered. */
+/** Formats the delivered part of the goal's value. */
 export function delivered(done: number | string, total: number, unit: string): string {
   return `${done} of ${total}${unit && ` ${unit}`} delivered`;
 }

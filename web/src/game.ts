@@ -4,7 +4,7 @@ import type { Branch, LiveConfig } from "./messages.js";
 import "./play.js";
 import type { ChaicPlay, GameResult } from "./play.js";
 
-/** How fast the world moves, and whether it waits for the person. */
+/** Speed of the world, and whether it waits for the person. */
 export interface Pace {
   isLive: boolean;
   speed: number;
@@ -39,6 +39,6 @@ export async function startGame(
     place.append(traceOffer(result.trace, () => onReplay(result)));
   });
   place.replaceChildren(element);
-  // The button that has started the game does not receive its keys.
+  // The game takes the focus, so that the start button does not receive its keys.
   element.focus({ preventScroll: true });
 }

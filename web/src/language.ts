@@ -4,7 +4,7 @@ import { html, nothing, type TemplateResult } from "lit";
 import { clock, nearest } from "./frames.js";
 import type { LanguageAgent, ReplayInfo } from "./messages.js";
 
-/** Describes the last decisions of each agent with a language model; `onSeek` receives the frame of others. */
+/** Describes the last decisions of each agent with a language model; `onSeek` receives the frame of another selected decision. */
 export function language(
   agents: LanguageAgent[],
   info: ReplayInfo,

@@ -33,10 +33,10 @@ const ONLY = [
   [208, 64, 40, 70],
   [16, 136, 140, 70],
 ];
-/** Probability from which an object counts as wanted, per mille. */
+/** Minimum probability of a wanted object, per mille. */
 const WANTED = 500;
 
-/** Chosen layers, their data, and how they are drawn. */
+/** Chosen layers with their data; draws them over a map. */
 export class MapLayers {
   private readonly shown = new Set<Layer>(["truth", "explored", "objects", "paths"]);
   private data = NO_DATA;
@@ -48,7 +48,7 @@ export class MapLayers {
     private readonly onChange: () => void,
   ) {}
 
-  /** Forgets the data of another replay. */
+  /** Discards the data of the previous replay. */
   reset(): void {
     this.data = NO_DATA;
     this.rerun = undefined;
@@ -64,7 +64,7 @@ export class MapLayers {
     return this.shown.has("limits");
   }
 
-  /** Takes the progress of the agents; returns whether the shown frame must be drawn again. */
+  /** Stores the progress of the agents; returns whether the shown frame must be drawn again. */
   advanced(state: RerunState, frame: number): boolean {
     this.rerun = state;
     this.host.requestUpdate();
@@ -125,7 +125,7 @@ export class MapLayers {
     context.drawImage(cells, x, y, first.n_columns * first.cell, rows * first.cell);
   }
 
-  /** Offers the layers. */
+  /** Renders the controls that select layers. */
   choice(info: ReplayInfo): TemplateResult {
     const box = (layer: Layer, text: string): TemplateResult =>
       html`<label>

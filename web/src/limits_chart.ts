@@ -12,7 +12,7 @@ const TOP = 8;
 const RIGHT = 12;
 /** Masses at which the axis has marks, kilograms. */
 const MASSES_KG = [0, 0.1, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500];
-/** Distance between marks of heights, and the least height of the axis, meters. */
+/** Distance between height marks, and the minimum height of the axis, meters. */
 const STEP_M = 0.5;
 const LEAST_M = 2;
 
@@ -53,7 +53,7 @@ export function limitsChart(partner: AgentInfo, objects: TaskObject[]): Template
   </svg>`;
 }
 
-/** Returns the first value and those of the others whose labels do not touch the previous one. */
+/** Returns the first value, and each further value whose label does not touch the previous label. */
 function spaced(values: number[], x: (value: number) => number): number[] {
   const LEAST_PX = 26;
   return values.reduce<number[]>(

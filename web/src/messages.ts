@@ -48,7 +48,7 @@ export interface ReplayInfo {
   helper: string;
   seed: number;
   chaic: string;
-  /** Frame from which it continues another trace. */
+  /** Frame from which this trace continues another trace. */
   branch_at: number | null;
   /** Helpers that can take over. */
   successors: string[];
@@ -94,7 +94,7 @@ export interface LanguageAgent {
   decisions: { frame: number; text: string; passages: Passage[] }[];
   /** Number of decisions whose passages are not in the page. */
   n_left_out: number;
-  /** Why the record cannot be read. */
+  /** Reason why the record cannot be read. */
   problem: string | null;
 }
 
@@ -121,7 +121,7 @@ export interface RerunInfo {
 
 /** State of the agents that run again beside a replay. */
 export interface RerunState {
-  /** Frame that they have reached. */
+  /** Frame that these agents have reached. */
   frame: number;
   is_complete: boolean;
   agents: RerunInfo[];
@@ -133,12 +133,12 @@ export type Place = [number, number];
 /** Memory of an agent at a frame. */
 export interface Memory {
   agent: number;
-  /** Frame of the decision from which the memory is. */
+  /** Frame of the decision at which the memory was stored. */
   frame: number;
   seen_m2: number;
   /** Position of the first cell. */
   map_at: Place;
-  /** Side of a cell. */
+  /** Side of a cell, in widths of the map. */
   cell: number;
   n_columns: number;
   /** Probability that the goal wants an object in per mille, for agents that infer the goal. */
@@ -163,7 +163,7 @@ export interface TaskObject {
   mass_kg: number;
 }
 
-/** Layers of the map that need data of the worker. */
+/** Data of the map's layers, from the worker. */
 export interface LayerData {
   memories: Memory[];
   /** Objects of the task; empty if the limits of the partner are not shown. */
@@ -197,7 +197,7 @@ export interface MapPicture extends Picture {
 /** Level of a person's decisions. */
 export type InputLevel = "plans" | "steps";
 
-/** What is played, and by whom. */
+/** Configuration of a played episode. */
 export interface LiveConfig {
   seed: number;
   /** Agent that the person controls: 0 is the partner, 1 the helper. */
@@ -264,7 +264,7 @@ export type Request =
   | { type: "rerun" }
   | { type: "play"; module: ArrayBuffer; episode: Uint8Array; config: LiveConfig; branch?: Branch }
   | { type: "advance"; frames: number; viewPx: number; input?: { plan: string } | { action: Action } }
-  /** `isPartial` asks for only the lines that no earlier request has returned. */
+  /** `isPartial` requests only the lines that no earlier request has returned. */
   | { type: "trace"; isPartial: boolean }
   | { type: "reference"; helper: string }
   | ({ type: "continue"; module: ArrayBuffer; episode: Uint8Array; helper: string } & Branch);
@@ -289,7 +289,7 @@ export type Response =
   | { type: "over" }
   | { type: "error"; message: string };
 
-/** Where an episode is simulated: a worker or a server. Responses arrive in the order of the requests. */
+/** Simulator of an episode: a worker or a server. Responses arrive in the order of the requests. */
 export interface Simulator {
   post(request: Request): void;
   close(): void;

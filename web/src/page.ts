@@ -20,14 +20,14 @@ interface Embedded {
   language: LanguageAgent[];
 }
 
-/** What the page shows: a replay, possibly beside another one, at a frame. */
+/** Content that the page shows: a replay at a frame, possibly beside another replay. */
 interface Shown {
   replay: number;
   other?: number;
   frame: number;
 }
 
-/** What the page's address names: `#2@310` is frame 310 of the third replay, `#2+0@310` the same beside the first. */
+/** Parses the page's address: `#2@310` is frame 310 of the third replay, `#2+0@310` the same frame beside the first replay. */
 function address(): Shown {
   const [, replay, other, frame] = /^#(\d+)(?:\+(\d+))?@(\d+)$/.exec(location.hash) ?? [];
   return {
@@ -37,7 +37,7 @@ function address(): Shown {
   };
 }
 
-/** Changes what the page's address names. */
+/** Changes the fragment of the page's address. */
 function setFragment(fragment: string): void {
   // Pages inside a notebook have no address.
   if (location.protocol !== "about:") history.replaceState(null, "", `#${fragment}`);
@@ -74,7 +74,7 @@ class Replays {
   async show(wanted: Shown): Promise<void> {
     const contents = [wanted.replay, wanted.other].filter((k) => k !== undefined).map((k) => this.contents[k]);
     if (!contents.every((content) => content !== undefined)) {
-      // The address names a replay that the page does not have.
+      // The page does not have the replay in the address.
       if (this.contents.length > 0) await this.show({ replay: 0, frame: 0 });
       return;
     }
@@ -89,7 +89,7 @@ class Replays {
     try {
       sources = await Promise.all(contents.map((content) => this.source(content)));
     } catch (problem) {
-      // The replay before would look like the chosen one.
+      // The previous replay would look like the chosen one.
       if (this.isChosen(wanted)) this.clear();
       throw problem;
     }
@@ -115,7 +115,7 @@ class Replays {
     this.other.replaceChildren();
     this.other.disabled = true;
     this.player.replaceChildren(element);
-    // The address of the replay before would name another one.
+    // The address of the previous replay would be wrong.
     setFragment("");
   }
 
@@ -158,10 +158,10 @@ class Replays {
 }
 
 let replays: Replays | undefined;
-/** Ends the worker of a helper that goes on, when something else takes its place. */
+/** Ends the worker of a helper that continues a replay, when another element takes its place. */
 let continuation = new AbortController();
 
-/** Ends the worker of a helper that goes on; returns the signal for the next one. */
+/** Ends the worker of a helper that continues a replay; returns the abort signal for the next worker. */
 function endContinuation(): AbortSignal {
   continuation.abort();
   continuation = new AbortController();
@@ -195,7 +195,7 @@ async function goOn(source: Source, frame: number, helper: string): Promise<void
   const signal = endContinuation();
   const request: Request = { type: "continue", module, trace: from, episode, frame, helper };
   const response = await ask(workerSource(), request, signal);
-  // A game or another helper took the place meanwhile.
+  // Meanwhile, a game or another helper has taken the place on the page.
   if (!response || !status.isConnected) return;
   if (response.type !== "trace") {
     status.textContent = `The helper ${helper} cannot go on: ${response.type === "error" ? response.message : response.type}`;

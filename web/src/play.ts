@@ -22,12 +22,12 @@ import { startWorker } from "./workers.js";
 
 /** Side of the images in which a person points at objects, pixels. */
 const POINTING_PX = 512;
-/** Helpers whose results are laid beside the person's. */
+/** Helpers whose results are shown beside the person's result. */
 const REFERENCES = ["none", "rhp", "oracle"];
-/** Simulated time after which a study gets the next lines of the trace, frames. */
+/** Simulated time between two parts of the trace that a study gets, frames. */
 const RECORD_FRAMES = 15;
 
-/** What is played. */
+/** Episode to play, and its settings. */
 export interface Game {
   /** Empty if a server simulates. */
   module: ArrayBuffer;
@@ -38,7 +38,7 @@ export interface Game {
   isLive: boolean;
   /** Simulated seconds per second. */
   speed: number;
-  /** Recorded beginning. */
+  /** Recorded start of the episode, if the person takes over from a trace. */
   branch?: Branch;
   /** True in a study: the trace is passed on while it grows, and no results of others are shown. */
   isStudy?: boolean;
@@ -67,7 +67,7 @@ export class ChaicPlay extends LitElement {
   @state() private story: StoryLine[] = [];
   @state() private problem?: string;
   @state() private references = new Map<string, number>();
-  /** What a click on the picture does. */
+  /** Action of a click on the picture. */
   @state() private pointing: { kind: "pick_up" | "put_on" | "remove_obstacle"; hand: Hand } = {
     kind: "pick_up",
     hand: "left",
@@ -181,7 +181,7 @@ export class ChaicPlay extends LitElement {
     // A tab in the background gets no callbacks; the episode goes on where it was.
     const framesPerSecond = (this.game?.speed ?? 1) * (this.info?.frames_per_second ?? 0);
     this.elapsedFrames += (Math.min(time - this.lastTime, 250) / 1000) * framesPerSecond;
-    // The world stands while a picture takes longer than a second, for example without a connection to a server.
+    // The world pauses while a picture takes longer than a second, for example without a connection to a server.
     this.elapsedFrames = Math.min(this.elapsedFrames, Math.max(framesPerSecond, 1));
     this.lastTime = time;
     const isWaiting = this.shown?.status === "waiting" && !this.input && !this.game?.isLive;
@@ -244,7 +244,7 @@ export class ChaicPlay extends LitElement {
     this.post({ type: "trace", isPartial: this.game?.isStudy ?? false });
   }
 
-  /** Passes on the lines that the trace has in addition. */
+  /** Passes on the new lines of the trace. */
   private record(added: string): void {
     if (added) this.dispatchEvent(new CustomEvent<string>("recorded", { detail: added }));
   }
@@ -290,7 +290,7 @@ export class ChaicPlay extends LitElement {
     const target = event.composedPath()[0] as HTMLElement;
     if (event.ctrlKey || event.altKey || event.metaKey || target.matches("select, input")) return;
     const isSteps = this.game?.config.level === "steps";
-    // A key that is held chooses one plan, not those of the next turns.
+    // A key that is held down chooses one plan only, not further plans in the next turns.
     const digit = /^[1-9]$/.test(event.key) && !event.repeat ? Number(event.key) - 1 : undefined;
     const steps: Record<string, Action> = {
       ArrowUp: "move_forward",

@@ -1,4 +1,4 @@
-// Player of one replay in a worker. Of several requests while the worker draws, only the last counts.
+// Player of one replay in a worker. If several requests come while the worker draws, only the last is executed.
 
 import type {
   FrameState,
@@ -22,7 +22,7 @@ export interface DrawnFrame {
   layers: LayerData;
 }
 
-/** What a player needs. */
+/** Inputs of a player. */
 export interface Source {
   module: ArrayBuffer;
   trace: Uint8Array;

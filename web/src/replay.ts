@@ -62,7 +62,7 @@ export class ChaicReplay extends LitElement {
     if (changed.has("source") && this.source) this.open(this.source);
   }
 
-  /** Shows a frame and stops; as the first one if the replay is not verified yet. */
+  /** Shows a frame and stops. If the replay is not verified yet, it is the first frame shown. */
   seek(frame: number): void {
     if (!this.info?.is_complete) this.start = frame;
     this.playback.seek(frame);
@@ -211,7 +211,7 @@ export class ChaicReplay extends LitElement {
     </div>`;
   }
 
-  /** Offers to go on from the shown frame as a person, or with another helper. */
+  /** Renders the controls to continue from the shown frame, as a person or with another helper. */
   private seats(info: ReplayInfo): TemplateResult | typeof nothing {
     const takeOver = (seat: number): void => {
       this.playback.seek(this.frame);
@@ -300,7 +300,7 @@ function limits(info: ReplayInfo): string {
   return `The partner reaches from ${low} to ${high} m and lifts ${partner.strength_kg.toFixed(0)} kg.`;
 }
 
-/** Says from where the replay continues another one. */
+/** Describes the frame from which the replay continues another replay. */
 function branch({ branch_at, frames_per_second }: ReplayInfo): string {
   return branch_at === null ? "" : `It continues another replay from ${clock(branch_at, frames_per_second)} on.`;
 }

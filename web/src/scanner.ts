@@ -1,4 +1,4 @@
-// One switch: choices are offered one after the other; Enter or space takes the focused one.
+// Input with one switch (scanning): choices are focused one after the other; Enter or space takes the focused choice.
 
 import { html, nothing, type ReactiveControllerHost, type TemplateResult } from "lit";
 
@@ -57,7 +57,7 @@ export class Scanner {
     // The focused element may be inside of a shadow root.
     let focused = document.activeElement;
     while (focused?.shadowRoot?.activeElement) focused = focused.shadowRoot.activeElement;
-    // A person is changing the time.
+    // Scanning pauses while a person changes the time.
     if (focused?.matches("select")) return;
     const choices = this.choices();
     const at = choices.findIndex((choice) => choice === focused);

@@ -27,7 +27,7 @@ import { drawToken, Participant, Upload } from "./study/server.js";
 import { ServerSimulator } from "./study/simulator.js";
 import { paragraphs } from "./study/text.js";
 
-/** Letters and digits of participant codes: those that are not mistaken for each other. */
+/** Letters and digits of participant codes, without those that look alike. */
 const ALPHABET = "ABCDEFGHJKLMNPQRSTUVWXYZ23456789";
 const CODE_LENGTH = 10;
 /** Time for which a browser can read a downloaded file, milliseconds. */
@@ -125,7 +125,7 @@ export class ChaicStudy extends LitElement {
     return `chaic-study-${digest}-${server ? "server" : this.slotNumber}`;
   }
 
-  /** Goes on with a participation that a server stores: at the entry, at the checkpoint, or with the deletion. */
+  /** Continues a participation that a server stores: at the entry, at the checkpoint, or with the deletion. */
   private async resumeWithServer(log: StudyLog, identity: Identity): Promise<void> {
     const [start] = log.records;
     if (identity.isLeaving) {
@@ -163,7 +163,7 @@ export class ChaicStudy extends LitElement {
     void this.upload?.send();
   }
 
-  /** Goes on at the checkpoint. An episode that was running goes on if the server has it, and counts as left otherwise. */
+  /** Continues at the checkpoint. An episode that was running goes on if the server has it, and counts as left otherwise. */
   private async resume(log: StudyLog): Promise<void> {
     this.log = log;
     this.isResumed = true;
@@ -173,7 +173,7 @@ export class ChaicStudy extends LitElement {
     await this.completeAtEnd();
   }
 
-  /** Runs a change of the state once: a second click before its end has no effect. */
+  /** Runs a change of the state; a second click before its end has no effect. */
   private async once(change: () => Promise<void>): Promise<void> {
     if (this.isChanging) return;
     this.isChanging = true;
@@ -184,10 +184,10 @@ export class ChaicStudy extends LitElement {
     }
   }
 
-  /** The participant agrees: the log comes into being. */
+  /** Creates the log after the participant has agreed. */
   private async agree(): Promise<void> {
     const { format, version, chaic, digest, server } = this.content!;
-    // Without storage, the consent stays, with the reason.
+    // Without storage, the page stays at the consent and shows the reason.
     const log = await StudyLog.open(this.logName(), true);
     if (!log) return;
     this.problem = undefined;
@@ -205,7 +205,7 @@ export class ChaicStudy extends LitElement {
     this.focusHeading();
   }
 
-  /** Asks the server for a slot. A lost answer is asked for again with the same identity, also after a reload. */
+  /** Asks the server for a slot. After a lost answer, it repeats the request with the same identity, also after a reload. */
   private async enter(log: StudyLog, known?: Identity): Promise<void> {
     const identity = known ?? { code: drawCode(), token: drawToken(), isLeaving: false };
     if (!known) await log.setIdentity(identity);
@@ -272,7 +272,7 @@ export class ChaicStudy extends LitElement {
     this.waits = undefined;
   }
 
-  /** Deletes a log, and shows if this waits for another tab. */
+  /** Deletes a log, and shows whether the deletion waits for another tab. */
   private async deleteLog(log: StudyLog): Promise<void> {
     await log.delete(() => (this.isDeletionBlocked = true));
     this.isDeletionBlocked = false;
@@ -354,7 +354,7 @@ export class ChaicStudy extends LitElement {
     });
   }
 
-  /** Saves the data. Those with traces are on the server if it simulates. */
+  /** Saves the data as a file. If the server simulates, it has the traces, so the file comes from the server. */
   private async download(): Promise<void> {
     // The server refuses the file before it has the last record.
     const file = this.isSimulatedByServer()
@@ -406,7 +406,7 @@ export class ChaicStudy extends LitElement {
     </div>`;
   }
 
-  /** Says what is delayed by another tab or a lost connection, and what the participant can do. */
+  /** Describes delays by another tab or a lost connection, and the options of the participant. */
   private delay(): string {
     if (this.isDeletionBlocked) {
       return "This study is open in another tab, so the data in this browser are not deleted yet. Close that tab.";
@@ -477,7 +477,7 @@ export class ChaicStudy extends LitElement {
     }
   }
 
-  /** Says how far the deletion of all data is. */
+  /** Describes the progress of the deletion of all data. */
   private deletion({ server }: StudyContent): string {
     if (this.waits !== "deletion") return `All your data ${this.places()} are deleted. You may close this page.`;
     if (!server || this.isDeletionBlocked) return "Your data are being deleted. Keep this page open.";

@@ -26,7 +26,7 @@ export function timeline(
       : "";
     return html`<span class="bar ${kind}" style=${styleMap(place)}></span>${mark}`;
   };
-  // The list of events has the same content for those who do not see the timeline.
+  // The list of events has the same content, for screen readers.
   return html`<div class="timeline" aria-hidden="true">
     <div class="labels">
       <span>deliveries</span>

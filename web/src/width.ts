@@ -1,4 +1,4 @@
-// Redrawing of an element at another width.
+// Redraws an element when its width changes.
 
 import type { ReactiveController, ReactiveControllerHost } from "lit";
 

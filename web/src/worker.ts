@@ -18,25 +18,25 @@ let player: Player | undefined;
 let live: Live | undefined;
 let episode: Uint8Array | undefined;
 let isRerunning = false;
-/** Number of lines of the trace that requests for parts of it have returned. */
+/** Number of lines of the trace that partial requests have returned. */
 let nReturnedLines = 0;
-/** Trap of the module, which runs no further tasks. */
+/** Trap of the WebAssembly module; after it, no further tasks run. */
 let trap: WebAssembly.RuntimeError | undefined;
 /** Frames that are drawn once in advance, so that browsers optimize the module before a person seeks. */
 let warmUpFrames: number[] = [];
 
 /** Longest time for which the worker re-simulates before it answers requests, milliseconds. */
 const SLICE_MS = 20;
-/** Frames that are re-simulated between two looks at the clock. */
+/** Number of frames that are re-simulated between two checks of the time. */
 const VERIFIED_FRAMES = 20;
-/** Time between messages about their progress, milliseconds. */
+/** Time between messages about the progress of the agents, milliseconds. */
 const PROGRESS_MS = 250;
 
 function send(response: Response, transfer: ArrayBuffer[] = []): void {
   postMessage(response, { transfer });
 }
 
-function taken(picture: { width: number; height: number; rgba(): Uint8Array; free(): void }): Picture {
+function toPicture(picture: { width: number; height: number; rgba(): Uint8Array; free(): void }): Picture {
   const { width, height } = picture;
   const rgba = new Uint8ClampedArray(picture.rgba() as Uint8Array<ArrayBuffer>);
   picture.free();
@@ -92,7 +92,7 @@ function verify(): void {
   send({ type: "verified", info });
 }
 
-/** Draws the next frame in advance, if no request comes first. */
+/** Draws the next warm-up frame, unless a request comes first. */
 function warmUp(wanted: Wanted): void {
   const frame = warmUpFrames.pop();
   if (!player || frame === undefined) return;
@@ -105,13 +105,13 @@ function warmUp(wanted: Wanted): void {
 function drawnMap(from: Player, widthPx: number): MapPicture {
   const picture = from.map(widthPx);
   const labels: MapLabel[] = JSON.parse(picture.labels());
-  return { ...taken(picture), labels };
+  return { ...toPicture(picture), labels };
 }
 
 function drawFrame(request: Extract<Request, { type: "frame" }>): void {
   if (!player) return;
   const state = JSON.parse(player.seek(request.frame));
-  const views = request.agents.map((agent) => taken(player!.view(agent, request.viewPx)));
+  const views = request.agents.map((agent) => toPicture(player!.view(agent, request.viewPx)));
   const map = request.mapPx > 0 ? drawnMap(player, request.mapPx) : null;
   const pictures = map ? [...views, map] : views;
   const layers = layerData(player, request.memories, request.withLimits);
@@ -164,7 +164,7 @@ function advance({ frames, viewPx, input }: Extract<Request, { type: "advance" }
   if (input && "action" in input) live.act(JSON.stringify(input.action));
   live.advance(frames);
   const state = JSON.parse(live.state());
-  const view = taken(live.view(viewPx));
+  const view = toPicture(live.view(viewPx));
   send({ type: "live", state, view }, [view.rgba.buffer]);
 }
 
@@ -189,7 +189,7 @@ function run(task: () => void): void {
   }
 }
 
-/** Runs a task after the requests that wait. */
+/** Runs a task after the waiting requests. */
 function later(task: () => void): void {
   setTimeout(() => run(task));
 }

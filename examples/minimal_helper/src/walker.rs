@@ -11,9 +11,9 @@ use chaic_core::{
     Vec3,
 };
 
-/// Distance from which it picks up or puts on, meters.
+/// Maximum distance at which the helper picks up or puts on objects, meters.
 const NEAR_M: f32 = 1.3;
-/// Depth straight ahead below which the path is blocked, meters.
+/// The path ahead is blocked if the depth straight ahead is below this, meters.
 const BLOCKED_M: f32 = 0.6;
 
 /// State of one episode.
@@ -21,9 +21,9 @@ const BLOCKED_M: f32 = 0.6;
 pub struct Walker {
     /// Briefing and random draws; `None` before the first `reset`.
     episode: Option<(Briefing, RngStream)>,
-    /// Targets of failed actions.
+    /// Targets of failed actions, which the helper does not try again.
     given_up: Vec<Target>,
-    /// Turns left of the current detour.
+    /// Remaining turns of the current detour.
     detour: u32,
 }
 
@@ -103,7 +103,7 @@ fn nearest(
     means.min_by(|a, b| horizontal_distance(a.1, here).total_cmp(&horizontal_distance(b.1, here)))
 }
 
-/// Depth of the central pixel, meters.
+/// Returns the depth of the central pixel, meters.
 fn depth_ahead_m(seen: &Observation) -> f32 {
     let middle = (seen.camera.height / 2 * seen.camera.width + seen.camera.width / 2) as usize;
     seen.images.depth_m.as_ref().map_or(f32::INFINITY, |d| d[middle])

@@ -20,7 +20,7 @@ export interface Form {
   items: Item[];
 }
 
-/** A combination of factor levels. */
+/** A condition: a combination of factor levels. */
 export interface Condition {
   seat: "partner" | "helper";
   input: InputLevel;
@@ -30,7 +30,7 @@ export interface Condition {
  * page has neither episode nor helper. */
 export type Trial = [position: number, condition: number, episode?: number, helper?: string];
 
-/** What the page of a study shows. */
+/** Content of the page of a study. */
 export interface StudyContent {
   format: string;
   version: number;
@@ -58,7 +58,7 @@ export interface StudyContent {
 /** Ratings by item; null for an item without an answer. */
 export type Ratings = Record<string, number | null>;
 
-/** How a trial ended. */
+/** Outcome of a trial. */
 export type TrialOutcome = "ended" | "stopped" | "left";
 
 /** A record of a participant's data (crates/eval/chaic-study/src/data.rs). */
@@ -71,7 +71,7 @@ export type DataRecord =
   | { type: "answers"; position: number; form: string; ratings: Ratings }
   | { type: "complete" };
 
-/** A part of the participation after the consent. */
+/** A step of the participation after the consent. */
 export type Step =
   | { kind: "instructions" }
   | { kind: "trial"; number: number; trial: Trial }
@@ -98,7 +98,7 @@ export function stepsOf(content: StudyContent, slot: number): Step[] {
   return [...steps, { kind: "debrief" }];
 }
 
-/** Returns whether the records have a step. */
+/** Returns whether the records show that a step is done. */
 function isDone(step: Step, records: DataRecord[]): boolean {
   return records.some((record) => {
     switch (step.kind) {

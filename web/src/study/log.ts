@@ -7,7 +7,7 @@ const STORE = "records";
 const IDENTITY = "identity";
 const IDENTITY_KEY = 1;
 
-/** What a participant shows to the server of a study. The data have no token. */
+/** Identity of a participant at the server of a study. The data contain no token. */
 export interface Identity {
   code: string;
   token: string;
@@ -22,7 +22,7 @@ function settled<T>(request: IDBRequest<T>): Promise<T> {
   });
 }
 
-/** Describes why the browser does not store data, and what helps. */
+/** Returns an error that describes why the browser does not store data, and the remedy. */
 function refusal(problem: unknown): Error {
   const reason = problem instanceof Error ? `${problem.name}: ${problem.message}` : "no reason given";
   return new Error(
@@ -31,7 +31,7 @@ function refusal(problem: unknown): Error {
   );
 }
 
-/** Longest time for which a reload waits for the page before it, milliseconds. */
+/** Maximum time for which a reloaded page waits for the previous page, milliseconds. */
 const LOCK_MS = 3000;
 
 /** Returns whether no other tab has this log. The lock ends with the page. */
@@ -51,7 +51,7 @@ export function lock(name: string): Promise<boolean> {
 export class StudyLog {
   /** Number of records that the browser has stored. */
   nStored: number;
-  /** Why the log takes no further records: the data have no gaps. */
+  /** Reason why the log takes no further records, so that the data have no gaps. */
   private failure?: Error;
   /** True if another tab deletes this log. */
   private isClosed = false;
@@ -86,7 +86,7 @@ export class StudyLog {
           request.result.createObjectStore(IDENTITY);
         } else {
           isAbsent = true;
-          // The database does not come into being.
+          // This abort prevents the creation of the database.
           request.transaction!.abort();
         }
       };

@@ -5,11 +5,11 @@ import type { LiveInfo } from "../messages.js";
 import type { DataRecord } from "./content.js";
 import type { Identity, StudyLog } from "./log.js";
 
-/** Longest duration of a request, milliseconds. */
+/** Time limit of a request, milliseconds. */
 const TIMEOUT_MS = 30_000;
 /** Pauses before a repetition, milliseconds: the first, and the longest after doubling. */
 const PAUSE_MS = [1000, 30_000] as const;
-/** Size of the records of a request, characters. A single longer record has a request of its own. */
+/** Maximum size of the records in a request, characters. A longer record is sent alone. */
 const BATCH_LENGTH = 200_000;
 /** Size up to which a request outlives its page; browsers allow 64 KiB. */
 const KEEPALIVE_LENGTH = 20_000;
@@ -161,7 +161,7 @@ export class Upload {
           ? await this.participant.repeated("GET", "", undefined, () => this.set("waiting"))
           : await this.participant.repeated("PUT", `/records/${known}`, this.batch(known), () => this.set("waiting"));
       if (answer.status === 0) return;
-      // The server names what it has also if records before the sent ones are missing.
+      // The server reports its number of records even if records before the sent ones are missing.
       const n = this.log.records.length + (this.isServerWriting ? 1 : 0);
       if (answer.stored === undefined || answer.stored > n) {
         this.problem = answer.error ?? "the server has more data than this browser";

@@ -1,10 +1,10 @@
 // Simulator on the server of a study (crates/app/chaic-study-server/src/play_routes.rs): the requests of a game, one
-// after the other. A lost answer is asked for again by the number of its turn, so nothing happens twice.
+// after the other. A request without an answer is repeated with the same turn number, so no turn is performed twice.
 
 import type { LiveState, Picture, Request, Response, Simulator } from "../messages.js";
 import type { Answer, Participant } from "./server.js";
 
-/** Shortest time between two pictures, milliseconds. */
+/** Minimum time between two pictures, milliseconds. */
 const INTERVAL_MS = 70;
 const LINE_END = 10;
 

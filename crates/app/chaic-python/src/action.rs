@@ -6,7 +6,7 @@ use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
 use pythonize::{depythonize, pythonize};
 
-use crate::error::{mistake, short_repr};
+use crate::error::{short_repr, value_error};
 
 /// Kinds of actions; rows refer to them by index. Actions of a hand on an object take a pixel of the last image.
 pub const ACTIONS: [&str; 11] = [
@@ -23,18 +23,19 @@ pub const ACTIONS: [&str; 11] = [
     "wait",
 ];
 
-/// Duration of a wait in a row, frames; about that of a turn.
+/// Duration of a wait in a row, frames: about the duration of a step.
 const WAIT_FRAMES: u32 = 10;
 
-/// Parses a row: kind, and column and row of the pixel.
+/// Parses a row of integers: kind of action, column and row of the pixel.
 ///
 /// # Errors
 /// `ValueError` for an unknown kind or a negative pixel. Pixels outside the image resolve to nothing.
 pub fn from_row([kind, column, row]: [i64; 3]) -> PyResult<Action> {
     let pixel = || {
         let coordinate = |x: i64| {
-            u32::try_from(x)
-                .map_err(|_| mistake(format!("there is no pixel at column {column}, row {row}")))
+            u32::try_from(x).map_err(|_| {
+                value_error(format!("there is no pixel at column {column}, row {row}"))
+            })
         };
         Ok::<_, PyErr>(Target::Pixel { column: coordinate(column)?, row: coordinate(row)? })
     };
@@ -52,7 +53,7 @@ pub fn from_row([kind, column, row]: [i64; 3]) -> PyResult<Action> {
         10 => Action::Wait { frames: WAIT_FRAMES },
         other => {
             let n = ACTIONS.len();
-            return Err(mistake(format!("there is no action {other} of {n}")));
+            return Err(value_error(format!("there is no action {other} of {n}")));
         }
     })
 }
@@ -69,10 +70,10 @@ pub fn from_object(object: &Bound<'_, PyAny>) -> PyResult<Action> {
         } else {
             error.value(object.py()).to_string()
         };
-        mistake(format!("{} is no action: {problem}", short_repr(object)))
+        value_error(format!("{} is no action: {problem}", short_repr(object)))
     })?;
     match action {
-        Action::Wait { frames: 0 } => Err(mistake("a wait takes at least 1 frame")),
+        Action::Wait { frames: 0 } => Err(value_error("a wait takes at least 1 frame")),
         action => Ok(action),
     }
 }
@@ -126,8 +127,8 @@ pub fn proprioception_values(
 }
 
 /// Elements of [`proprioception_values`]: position in the world (meters), direction of view, elapsed fraction of the
-/// episode; for each hand, whether it holds an object and how many objects are in that one; whether both hands hold
-/// one object; and whether the last action succeeded or failed.
+/// episode. For each hand: whether it holds an object, and how many objects that object contains. The last elements
+/// are whether both hands hold one object, and whether the last action succeeded or failed.
 pub const PROPRIOCEPTION: [&str; 12] = [
     "x_m",
     "z_m",

@@ -11,14 +11,14 @@ use pyo3::prelude::*;
 use crate::action::from_object;
 use crate::observation::{Briefing, Observation};
 
-/// Length of the kept end of a traceback, characters.
+/// Maximum length of a traceback, characters; its end is kept.
 const MAX_TRACEBACK: usize = 4000;
 
 /// Agent that is a Python object with `reset(briefing)` and `act(observation)`.
 pub struct PyAgent {
     object: Py<PyAny>,
     sensors: SensorConfig,
-    /// Error of its `reset`.
+    /// Error that `reset` of the Python object has raised.
     broken: Option<AgentError>,
     stop: &'static AtomicBool,
 }

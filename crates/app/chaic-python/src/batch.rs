@@ -15,7 +15,8 @@ use rayon::prelude::*;
 use crate::action;
 use crate::episode::Episode;
 use crate::error::{
-    failure, from_env, mistake, no_attribute, no_such, not_picklable, poisoned, readable, writable,
+    from_env, index_error, no_attribute, not_picklable, poisoned, readable, runtime_error,
+    value_error, writable,
 };
 use crate::observation::Briefing;
 use crate::options::Options;
@@ -85,10 +86,10 @@ fn check_shape(
     expected: &[usize],
 ) -> PyResult<()> {
     match found {
-        Some(_) if !is_requested => Err(mistake(format!("no images of {name} are requested"))),
-        None if is_requested => Err(mistake(format!("the array {name} is missing"))),
+        Some(_) if !is_requested => Err(value_error(format!("no images of {name} are requested"))),
+        None if is_requested => Err(value_error(format!("the array {name} is missing"))),
         Some(shape) if shape != expected => {
-            Err(mistake(format!("{name} has shape {shape:?}, expected {expected:?}")))
+            Err(value_error(format!("{name} has shape {shape:?}, expected {expected:?}")))
         }
         _ => Ok(()),
     }
@@ -98,7 +99,7 @@ fn slice_of<'a, T: Element>(
     array: &'a mut Option<PyReadwriteArrayDyn<'_, T>>,
 ) -> PyResult<Option<&'a mut [T]>> {
     let Some(array) = array else { return Ok(None) };
-    let wrong = || mistake("an image array is not C-contiguous");
+    let wrong = || value_error("an image array is not C-contiguous");
     // A slice of an array in Fortran order has the elements in another order.
     if !array.is_c_contiguous() {
         return Err(wrong());
@@ -112,7 +113,7 @@ fn outcome_codes(
 ) -> PyResult<Bound<'_, PyArray1<u8>>> {
     let code = |outcome| if outcome == AdvanceOutcome::NeedsAction { NEEDS_ACTION } else { ENDED };
     let codes: Result<Vec<u8>, _> = outcomes.into_iter().map(|outcome| outcome.map(code)).collect();
-    Ok(PyArray1::from_vec(py, codes.map_err(failure)?))
+    Ok(PyArray1::from_vec(py, codes.map_err(runtime_error)?))
 }
 
 #[pymethods]
@@ -128,7 +129,11 @@ impl Batch {
     ) -> PyResult<Batch> {
         let options = Options::new(py, options)?;
         if episodes.len() != seeds.len() {
-            return Err(mistake(format!("{} episodes and {} seeds", episodes.len(), seeds.len())));
+            return Err(value_error(format!(
+                "{} episodes and {} seeds",
+                episodes.len(),
+                seeds.len()
+            )));
         }
         let work: PyResult<Vec<_>> = episodes
             .iter()
@@ -167,7 +172,7 @@ impl Batch {
         #[pyo3(from_py_with = crate::error::seeds)] seeds: Vec<u32>,
     ) -> PyResult<()> {
         if worlds.len() != episodes.len() || worlds.len() != seeds.len() {
-            return Err(mistake("worlds, episodes and seeds differ in number"));
+            return Err(value_error("the numbers of worlds, episodes and seeds differ"));
         }
         let episodes: Vec<_> = episodes.iter().map(|e| Arc::clone(&e.get().0)).collect();
         let Batch { envs, options } = self;
@@ -237,7 +242,7 @@ impl Batch {
         if values.shape() != [n, n_values] || mask.shape() != [n, n_actions] {
             let problem =
                 format!("expected arrays of shape ({n}, {n_values}) and ({n}, {n_actions})");
-            return Err(mistake(problem));
+            return Err(value_error(problem));
         }
         for (k, slot) in envs.slots().iter().enumerate() {
             let Some(observation) = envs.observation(k) else { continue };
@@ -260,7 +265,9 @@ impl Batch {
         let actions = actions.as_array();
         if actions.shape() != [n, 3] {
             let found = actions.shape();
-            return Err(mistake(format!("expected actions of shape ({n}, 3), found {found:?}")));
+            return Err(value_error(format!(
+                "expected actions of shape ({n}, 3), found {found:?}"
+            )));
         }
         let mut submitted = Vec::with_capacity(n);
         for (k, row) in actions.rows().into_iter().enumerate() {
@@ -310,7 +317,7 @@ impl Batch {
             vec![done, total]
         };
         let rows: Vec<Vec<f64>> = envs.envs().iter().map(row).collect();
-        PyArray2::from_vec2(py, &rows).map_err(failure)
+        PyArray2::from_vec2(py, &rows).map_err(runtime_error)
     }
 
     /// Returns the score of a world so far, as `World.score`.
@@ -321,7 +328,7 @@ impl Batch {
     ) -> PyResult<Bound<'py, PyAny>> {
         let envs = self.envs()?;
         let n = envs.envs().len();
-        score(py, envs.envs().get(world).ok_or_else(|| no_such("world", world, n))?)
+        score(py, envs.envs().get(world).ok_or_else(|| index_error("world", world, n))?)
     }
 
     /// Returns the briefing of an agent of a world.
@@ -333,10 +340,10 @@ impl Batch {
     ) -> PyResult<Briefing> {
         let envs = self.envs()?;
         let n = envs.envs().len();
-        let env = envs.envs().get(world).ok_or_else(|| no_such("world", world, n))?;
+        let env = envs.envs().get(world).ok_or_else(|| index_error("world", world, n))?;
         let n = env.slots().len();
         if usize::from(agent) >= n {
-            return Err(no_such("agent", usize::from(agent), n));
+            return Err(index_error("agent", usize::from(agent), n));
         }
         Ok(Briefing(env.briefing(AgentId(agent))))
     }
@@ -353,7 +360,7 @@ impl Batch {
     ) -> PyResult<String> {
         let envs = self.envs()?;
         let n = envs.envs().len();
-        let env = envs.envs().get(world).ok_or_else(|| no_such("world", world, n))?;
+        let env = envs.envs().get(world).ok_or_else(|| index_error("world", world, n))?;
         Ok(env.digest().to_string())
     }
 

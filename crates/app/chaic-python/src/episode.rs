@@ -13,7 +13,7 @@ use numpy::{PyArray1, PyArray3, PyArrayMethods as _, PyUntypedArrayMethods as _}
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
-use crate::error::{failure, mistake, no_attribute, readable};
+use crate::error::{no_attribute, readable, runtime_error, value_error};
 
 /// An episode: a scene, its objects and people, and the partner's goal.
 #[pyclass(frozen, module = "chaic._chaic", skip_from_py_object)]
@@ -27,7 +27,8 @@ impl Episode {
     #[new]
     fn new(py: Python<'_>, id: &str) -> PyResult<Episode> {
         let episode = py.detach(|| find_episode(id));
-        let episode = episode.map_err(|e| if e.is_usage() { mistake(e) } else { failure(e) })?;
+        let episode =
+            episode.map_err(|e| if e.is_usage() { value_error(e) } else { runtime_error(e) })?;
         Ok(Episode(Arc::new(episode)))
     }
 
@@ -35,7 +36,7 @@ impl Episode {
     #[staticmethod]
     fn from_json(py: Python<'_>, text: &str) -> PyResult<Episode> {
         let episode = py.detach(|| chaic_episodes::Episode::parse(text.as_bytes(), "the text"));
-        Ok(Episode(Arc::new(episode.map_err(mistake)?)))
+        Ok(Episode(Arc::new(episode.map_err(value_error)?)))
     }
 
     /// Returns the text of an episode file.
@@ -66,7 +67,7 @@ impl Episode {
             let world = World::new(self.0.setup().clone(), RuleSet::PAPER.world)?;
             Ok::<_, SetupError>(floor_plan::draw(&world, width))
         });
-        let picture = picture.map_err(mistake)?;
+        let picture = picture.map_err(value_error)?;
         let shape = [picture.height() as usize, picture.width() as usize, 3];
         PyArray1::from_vec(py, picture.into_raw()).reshape(shape)
     }
@@ -118,16 +119,16 @@ pub fn encode_png<'py>(
 ) -> PyResult<Bound<'py, PyBytes>> {
     let rgb = readable("rgb", rgb)?;
     let &[height, width, 3] = rgb.shape() else {
-        return Err(mistake("expected a picture of shape (height, width, 3)"));
+        return Err(value_error("expected a picture of shape (height, width, 3)"));
     };
     if height == 0 || width == 0 {
-        return Err(mistake("the picture has no pixels"));
+        return Err(value_error("the picture has no pixels"));
     }
     let pixels: Vec<u8> = rgb.as_array().iter().copied().collect();
     let mut bytes = Cursor::new(Vec::new());
     let picture = RgbImage::from_raw(width as u32, height as u32, pixels)
-        .ok_or_else(|| mistake("the picture is too large"))?;
-    picture.write_to(&mut bytes, ImageFormat::Png).map_err(failure)?;
+        .ok_or_else(|| value_error("the picture is too large"))?;
+    picture.write_to(&mut bytes, ImageFormat::Png).map_err(runtime_error)?;
     Ok(PyBytes::new(py, bytes.get_ref()))
 }
 
@@ -138,11 +139,11 @@ const MAX_IDS: usize = 10_000_000;
 /// `gen-standard:A..B`. A split of more than 10 million episodes raises `ValueError`.
 #[pyfunction]
 pub fn episode_ids(split: &str, task: &str) -> PyResult<Vec<String>> {
-    let split: Split = split.parse().map_err(mistake)?;
-    let task: TaskId = task.parse().map_err(mistake)?;
+    let split: Split = split.parse().map_err(value_error)?;
+    let task: TaskId = task.parse().map_err(value_error)?;
     let n = split.len_of(task);
     if n > MAX_IDS {
-        return Err(mistake(format!("{split} has {n} episodes, expected at most {MAX_IDS}")));
+        return Err(value_error(format!("{split} has {n} episodes, expected at most {MAX_IDS}")));
     }
     Ok((0..n).map(|k| split.episode_id(task, k)).collect())
 }

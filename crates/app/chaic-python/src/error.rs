@@ -14,16 +14,16 @@ use pyo3::exceptions::{
 use pyo3::prelude::*;
 
 /// Returns a `ValueError` for invalid arguments.
-pub fn mistake(error: impl Display) -> PyErr {
+pub fn value_error(error: impl Display) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
 
 /// Returns an `IndexError` for an index `k` of `n` items.
-pub fn no_such(what: &str, k: usize, n: usize) -> PyErr {
+pub fn index_error(what: &str, k: usize, n: usize) -> PyErr {
     PyIndexError::new_err(format!("there is no {what} {k} of {n}"))
 }
 
-/// Range of numbers that have no other limit than their type.
+/// Range of numbers that only their type limits.
 pub const ANY_NUMBER: RangeInclusive<u32> = 0..=u32::MAX;
 
 /// Extracts an integer; `name` names it in the error.
@@ -53,7 +53,7 @@ fn integers(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<u32>> {
 
 fn out_of_range(name: &str, value: &Bound<'_, PyAny>, range: &RangeInclusive<u32>) -> PyErr {
     let (start, end) = (range.start(), range.end());
-    mistake(format!("{name} is {}, expected {start} to {end}", short_repr(value)))
+    value_error(format!("{name} is {}, expected {start} to {end}", short_repr(value)))
 }
 
 /// Extracts a seed; raises `ValueError` if it is out of range.
@@ -110,24 +110,24 @@ pub fn no_attribute(class: &str, name: &str, renamed: &[(&str, &str)]) -> PyErr 
     })
 }
 
-/// Returns a `TypeError` for an object with a state that is not stored. `instead` is what to do.
+/// Returns a `TypeError` for an object that cannot be pickled. `instead` describes the alternative.
 pub fn not_picklable(class: &str, instead: &str) -> PyErr {
     PyTypeError::new_err(format!("a {class} can be neither pickled nor copied: {instead}"))
 }
 
 /// Returns a `RuntimeError` for a failure or an invalid state.
-pub fn failure(error: impl Display) -> PyErr {
+pub fn runtime_error(error: impl Display) -> PyErr {
     PyRuntimeError::new_err(error.to_string())
 }
 
 /// Converts an error of an environment.
 pub fn from_env(error: &EnvError) -> PyErr {
-    if error.is_usage() { mistake(error) } else { failure(error) }
+    if error.is_usage() { value_error(error) } else { runtime_error(error) }
 }
 
 /// Returns a `RuntimeError` for an object in which a call panicked.
 pub fn poisoned<T>(_: T) -> PyErr {
-    failure("an earlier call panicked; create a new object")
+    runtime_error("an earlier call panicked; create a new object")
 }
 
 /// Borrows an array of the caller for reading; `name` names it in the error.
@@ -154,8 +154,10 @@ pub fn writable<'py, T: Element, D: Dimension>(
 
 fn not_borrowed(name: &str, problem: &BorrowError) -> PyErr {
     match problem {
-        BorrowError::NotWriteable => mistake(format!("the array {name} is read-only")),
-        _ => failure(format!("another argument or thread uses the memory of the array {name} now")),
+        BorrowError::NotWriteable => value_error(format!("the array {name} is read-only")),
+        _ => runtime_error(format!(
+            "another argument or thread uses the memory of the array {name} now"
+        )),
     }
 }
 

@@ -26,7 +26,7 @@ use pythonize::depythonize;
 use serde::Deserialize;
 
 use crate::agent::{PyAgent, agent_error};
-use crate::error::{failure, mistake};
+use crate::error::{runtime_error, value_error};
 use crate::isolated::{IsolatedHelper, IsolationOptions};
 use crate::options::{Names, check_integers, grants, perception, sensors};
 use crate::threads::refuse_fork;
@@ -94,7 +94,8 @@ impl HelperRegistry for PyHelperRegistry<'_> {
         self.built_in.names().into_iter().chain(own).collect()
     }
 
-    /// Returns an agent to read grants, sensors and isolation from; creates no Python object.
+    /// Returns an agent from which only grants, sensors and isolation are read. Creates no Python
+    /// object.
     fn make(&self, name: &str, rules: PlannerRules) -> Option<Helper> {
         if self.maker(name).is_none() {
             return self.built_in.make(name, rules);
@@ -150,7 +151,7 @@ struct Keywords {
 
 impl Keywords {
     fn track(&self) -> PyResult<Option<Track>> {
-        self.track.as_deref().map(|name| name.parse().map_err(mistake)).transpose()
+        self.track.as_deref().map(|name| name.parse().map_err(value_error)).transpose()
     }
 
     fn request(self, helpers: Vec<String>) -> PyResult<RunRequest> {
@@ -158,13 +159,13 @@ impl Keywords {
         let tasks: Option<Result<Vec<_>, _>> =
             self.tasks.map(|tasks| tasks.iter().map(|task| task.parse()).collect());
         Ok(RunRequest {
-            tasks: tasks.transpose().map_err(mistake)?,
+            tasks: tasks.transpose().map_err(value_error)?,
             helpers: Some(helpers),
-            split: self.split.map(|split| split.parse().map_err(mistake)).transpose()?,
+            split: self.split.map(|split| split.parse().map_err(value_error)).transpose()?,
             episodes: self.episodes,
             n_episodes: self.n_episodes,
             seeds: self.seeds,
-            rules: self.rules.map(|name| name.parse().map_err(mistake)).transpose()?,
+            rules: self.rules.map(|name| name.parse().map_err(value_error)).transpose()?,
             rule_overrides: self.set.into_vec(),
             no_traces: self.traces == Some(false),
             perception: self.perception,
@@ -255,7 +256,7 @@ pub fn evaluate(
     // `Run::open` reports a damaged record.
     let recorded = if resume { RunFolder::read(&out).ok() } else { None };
     let recorded: Option<RunOptions> = recorded.map(|(_, options)| options);
-    // A resumed run has recorded the perception that its track requires.
+    // The record of a resumed run already contains the perception that its track requires.
     let track = keywords.track()?.filter(|_| recorded.is_none()).unwrap_or_default();
     keywords.perception = track.perception_or(keywords.perception);
     keywords.behavior = track.perception_or(keywords.behavior);
@@ -266,7 +267,7 @@ pub fn evaluate(
     let makers: Vec<_> =
         helpers.into_iter().filter_map(|(name, maker)| Some((name, maker?))).collect();
     for (name, _) in &makers {
-        check_new_name(name, &built_in.names(), r#"{"mine": MyHelper}"#).map_err(mistake)?;
+        check_new_name(name, &built_in.names(), r#"{"mine": MyHelper}"#).map_err(value_error)?;
     }
     let grants = grants(&granted)?;
     let sensors = sensors(&images, image_size)?;
@@ -281,7 +282,7 @@ pub fn evaluate(
         IsolatedHelper::create_all(&options, &own_names, grants, &masked)
     })?;
     let helpers = PyHelperRegistry { built_in, makers, grants, sensors, limit_s, isolated, stop };
-    let shard = shard.map_or(Ok(Shard::WHOLE), |shard| shard.parse().map_err(mistake))?;
+    let shard = shard.map_or(Ok(Shard::WHOLE), |shard| shard.parse().map_err(value_error))?;
     let access = if resume { FolderMode::Resume } else { FolderMode::New };
     let on_result = on_result.clone().unbind();
     let mut problem: Option<PyErr> = None;
@@ -317,8 +318,8 @@ pub fn evaluate(
     }
 }
 
-/// Calls a function in another thread, and meanwhile handles the signals of this one: Ctrl-C raises `stop`. Returns the
-/// result, and the exception of a signal.
+/// Calls a function in another thread, and meanwhile handles the signals of this thread: Ctrl-C sets `stop`. Returns
+/// the result, and the exception that a signal raised.
 fn with_signals<T: Send>(
     stop: &AtomicBool,
     function: &mut (dyn FnMut() -> T + Send),
@@ -347,5 +348,5 @@ fn with_signals<T: Send>(
 
 /// Converts an error of a run.
 fn from_eval(error: &EvalError) -> PyErr {
-    if error.is_usage() { mistake(error) } else { failure(error) }
+    if error.is_usage() { value_error(error) } else { runtime_error(error) }
 }

@@ -18,7 +18,7 @@ use pyo3::prelude::*;
 use serde::Deserialize;
 
 use crate::agent::{PyAgent, agent_error};
-use crate::error::{failure, mistake};
+use crate::error::{runtime_error, value_error};
 use crate::options::sensors;
 
 /// Isolation of a run's helpers, from Python.
@@ -55,7 +55,7 @@ impl IsolatedHelper {
             readable: options.readable.clone(),
             masked: masked.to_vec(),
         };
-        let decision = Duration::try_from_secs_f64(options.decision_s).map_err(mistake)?;
+        let decision = Duration::try_from_secs_f64(options.decision_s).map_err(value_error)?;
         let default = Limits::default();
         // The limit applies to each action, as for helpers in this process. Processes have more time to start.
         let start = default.start.max(decision);
@@ -68,7 +68,7 @@ impl IsolatedHelper {
                 grants,
                 limits,
                 environment: Vec::new(),
-                confinement: Some(confined.map_err(mistake)?),
+                confinement: Some(confined.map_err(value_error)?),
             };
             Ok(IsolatedHelper { command: Arc::new(command), pool: Arc::default() })
         };
@@ -124,10 +124,10 @@ pub fn serve(
 ) -> PyResult<()> {
     let sensors = sensors(&images, image_size)?;
     let path = format!("/dev/fd/{output}");
-    let mut output = File::options().write(true).open(path).map_err(failure)?;
+    let mut output = File::options().write(true).open(path).map_err(runtime_error)?;
     let agent = Err(AgentError::Broken("the agent was not briefed".to_owned()));
     let mut agent = FreshAgent { maker, sensors, agent };
     let served =
         py.detach(|| serve_agent("python", &mut agent, &mut std::io::stdin().lock(), &mut output));
-    served.map_err(failure)
+    served.map_err(runtime_error)
 }

@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::error::no_attribute;
 
 /// Converts plain data to dictionaries, lists, numbers and strings.
-pub fn plain<'py>(py: Python<'py>, data: &impl Serialize) -> PyResult<Bound<'py, PyAny>> {
+pub fn to_python<'py>(py: Python<'py>, data: &impl Serialize) -> PyResult<Bound<'py, PyAny>> {
     Ok(pythonize(py, data)?)
 }
 
@@ -24,16 +24,16 @@ pub struct Briefing(pub chaic_core::Briefing);
 impl Briefing {
     /// Returns all fields.
     fn as_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        plain(py, &self.0)
+        to_python(py, &self.0)
     }
 
     fn __getattr__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
         if name == "layout" {
             // The field is absent without the grant of the state.
-            return plain(py, &self.0.layout);
+            return to_python(py, &self.0.layout);
         }
         let missing = |_| no_attribute("Briefing", name, &[("told", "disclosure")]);
-        plain(py, &self.0)?.get_item(name).map_err(missing)
+        to_python(py, &self.0)?.get_item(name).map_err(missing)
     }
 
     fn __repr__(&self) -> String {
@@ -102,19 +102,19 @@ impl Observation {
     /// State of the own body: `pose`, `hands`, `last`, `other_end`.
     #[getter]
     fn proprioception<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        plain(py, &self.0.proprioception)
+        to_python(py, &self.0.proprioception)
     }
 
     /// Camera of the images.
     #[getter]
     fn camera<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        plain(py, &self.0.camera)
+        to_python(py, &self.0.camera)
     }
 
     /// Granted information.
     #[getter]
     fn granted<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        plain(py, &self.0.granted)
+        to_python(py, &self.0.granted)
     }
 
     /// Color, uint8 [height, width, 3]; `None` if not requested.
@@ -145,7 +145,7 @@ impl Observation {
             let depth = depth_array(py, &history.images, &history.camera)?;
             let frame = pyo3::types::PyDict::new(py);
             frame.set_item("frame", history.frame)?;
-            frame.set_item("camera", plain(py, &history.camera)?)?;
+            frame.set_item("camera", to_python(py, &history.camera)?)?;
             frame.set_item("rgb", rgb)?;
             frame.set_item("depth", depth)?;
             frames.append(frame)?;

@@ -17,7 +17,7 @@ use pyo3::types::PyDict;
 use pythonize::depythonize;
 use serde::Deserialize;
 
-use crate::error::{failure, from_env, integer, mistake};
+use crate::error::{from_env, integer, runtime_error, value_error};
 
 /// Widths and heights of images, pixels.
 pub const IMAGE_SIZES: RangeInclusive<u32> = MIN_IMAGE_SIZE..=MAX_IMAGE_SIZE;
@@ -114,17 +114,17 @@ impl Options {
             rules: rule_set(&keywords.rules, &keywords.set.into_vec())?,
             sensors: sensors(&keywords.images.into_vec(), keywords.image_size)?,
             grants: grants(&keywords.grants.into_vec())?,
-            appearance: keywords.appearance.parse().map_err(mistake)?,
+            appearance: keywords.appearance.parse().map_err(value_error)?,
             perception: perception(&keywords.perception, &keywords.behavior)?,
             helper: keywords.helper,
             partner: keywords.partner,
             partner_image_size: keywords.partner_image_size,
         };
         if let Some(size) = options.partner_image_size {
-            options.perception.check_image_size(size).map_err(mistake)?;
+            options.perception.check_image_size(size).map_err(value_error)?;
         }
         if options.sensors.ids && !options.grants.ids {
-            return Err(mistake("images of ids need the grant \"ids\""));
+            return Err(value_error("images of ids need the grant \"ids\""));
         }
         options.agents()?;
         Ok(options)
@@ -158,7 +158,7 @@ impl Options {
                 let perception = Arc::clone(&self.perception);
                 let built_in = BuiltInWithPerception { perception: Arc::clone(&perception) };
                 let helpers = PolicyRegistry::bundled(&built_in, perception);
-                helpers.check_perception(name).map_err(mistake)?;
+                helpers.check_perception(name).map_err(value_error)?;
                 let found = helper_registry::find(&helpers, name, self.rules.planner);
                 found.map_err(|error| from_env(&error))?.map(AgentSlot::from)
             }
@@ -168,7 +168,7 @@ impl Options {
             CALLER => Some(AgentSlot::external(Grants { goal: true, ..self.grants }, self.sensors)),
             other => {
                 let problem = format!("unknown partner {other:?}; write \"rules\" or \"caller\"");
-                return Err(mistake(problem));
+                return Err(value_error(problem));
             }
         };
         Ok(EpisodeAgents { helper, partner })
@@ -180,7 +180,7 @@ pub fn image_size(value: &Bound<'_, PyAny>) -> PyResult<u32> {
     integer("image_size", value, &IMAGE_SIZES)
 }
 
-/// Checks the integers among keywords. The deserializer would not name those out of range.
+/// Checks the integers among keywords. Errors of the deserializer would not name the keyword.
 ///
 /// # Errors
 /// `ValueError` if one is outside the range, `TypeError` if it is no integer.
@@ -213,7 +213,7 @@ pub fn strings(value: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {
 /// # Errors
 /// `ValueError` for an unknown rule set or an invalid change.
 pub fn rule_set(name: &str, set: &[String]) -> PyResult<RuleSet> {
-    let rules = RuleSet::named(name.parse().map_err(mistake)?);
+    let rules = RuleSet::named(name.parse().map_err(value_error)?);
     set.iter().try_fold(rules, |rules, setting| rules.with(setting)).map_err(|e| from_env(&e))
 }
 
@@ -235,8 +235,8 @@ fn warn_of_old_keywords(py: Python<'_>, keywords: Option<&Bound<'_, PyDict>>) ->
 /// `ValueError` for an unknown name, `RuntimeError` if a file of weights can't be read.
 pub fn perception(perception: &str, behavior: &str) -> PyResult<Arc<dyn PerceptionFactory>> {
     perception_from_name(perception, behavior).map_err(|problem| match problem {
-        PerceptionError::File(_) => failure(problem),
-        _ => mistake(problem),
+        PerceptionError::File(_) => runtime_error(problem),
+        _ => value_error(problem),
     })
 }
 
@@ -245,8 +245,9 @@ pub fn perception(perception: &str, behavior: &str) -> PyResult<Arc<dyn Percepti
 /// # Errors
 /// `ValueError` for an unknown grant.
 pub fn grants(names: &[String]) -> PyResult<Grants> {
-    Grants::from_names(names.iter().map(String::as_str))
-        .map_err(|name| mistake(format!("unknown grant {name:?}; docs/grants.md lists all grants")))
+    Grants::from_names(names.iter().map(String::as_str)).map_err(|name| {
+        value_error(format!("unknown grant {name:?}; docs/grants.md lists all grants"))
+    })
 }
 
 /// Returns sensors for images of these kinds and this size.
@@ -256,11 +257,11 @@ pub fn grants(names: &[String]) -> PyResult<Grants> {
 pub fn sensors(kinds: &[String], image_size: u32) -> PyResult<SensorConfig> {
     if !IMAGE_SIZES.contains(&image_size) {
         let range = format!("{MIN_IMAGE_SIZE} to {MAX_IMAGE_SIZE}");
-        return Err(mistake(format!("image_size is {image_size}, expected {range}")));
+        return Err(value_error(format!("image_size is {image_size}, expected {range}")));
     }
     const KINDS: [&str; 3] = ["rgb", "depth", "ids"];
     if let Some(other) = kinds.iter().find(|kind| !KINDS.contains(&kind.as_str())) {
-        return Err(mistake(format!(
+        return Err(value_error(format!(
             "unknown kind of images {other:?}; the kinds are {}",
             KINDS.join(", ")
         )));

@@ -19,15 +19,17 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::action::to_object;
-use crate::error::{failure, from_env, mistake, no_attribute, no_such, not_picklable, poisoned};
-use crate::observation::{Briefing, Observation, plain};
+use crate::error::{
+    from_env, index_error, no_attribute, not_picklable, poisoned, runtime_error, value_error,
+};
+use crate::observation::{Briefing, Observation, to_python};
 use crate::options::{perception, rule_set};
 
 /// Refuses behavior recognition from images: the worlds of this package record no frame history for it.
 fn check_history(sensors: SensorConfig) -> PyResult<()> {
     match sensors.frame_history {
         None => Ok(()),
-        Some(_) => Err(mistake(
+        Some(_) => Err(value_error(
             "behavior=\"learned\" needs images between decisions, which only helpers inside a world get: \
              World(..., helper=NAME, behavior=\"learned\")",
         )),
@@ -36,7 +38,7 @@ fn check_history(sensors: SensorConfig) -> PyResult<()> {
 
 /// Error of an agent that was not briefed.
 fn not_reset() -> PyErr {
-    failure("call reset(briefing) first")
+    runtime_error("call reset(briefing) first")
 }
 
 /// Returns the names of grants.
@@ -72,7 +74,7 @@ impl PlanningAgent {
         let rules = rule_set(rules, &set)?.planner;
         let found = helper_registry::find(&helpers, name, rules).map_err(|e| from_env(&e))?;
         let Some(Helper { agent, grants }) = found else {
-            return Err(mistake("\"none\" is not a helper"));
+            return Err(value_error("\"none\" is not a helper"));
         };
         check_history(agent.sensors())?;
         Ok(PlanningAgent { agent: Mutex::new(agent), grants, is_reset: false })
@@ -93,7 +95,7 @@ impl PlanningAgent {
 
     /// Returns the requested sensors: `image_size`, `rgb`, `depth`, `ids`, `frame_history`.
     fn sensors<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        plain(py, &SensorRequest::from(self.agent.get_mut().map_err(poisoned)?.sensors()))
+        to_python(py, &SensorRequest::from(self.agent.get_mut().map_err(poisoned)?.sensors()))
     }
 
     /// Returns the next action.
@@ -107,7 +109,7 @@ impl PlanningAgent {
         }
         let agent = self.agent.get_mut().map_err(poisoned)?;
         let observation = &observation.get().0;
-        let action = py.detach(|| agent.act(observation)).map_err(failure)?;
+        let action = py.detach(|| agent.act(observation)).map_err(runtime_error)?;
         to_object(py, &action)
     }
 
@@ -181,7 +183,7 @@ impl Planner {
         match py.detach(|| agent.next_action()) {
             Ok(action) => to_object(py, &action).map(Some),
             Err(AgentError::Halted(_)) if !agent.policy().valid().is_empty() => Ok(None),
-            Err(error) => Err(failure(error)),
+            Err(error) => Err(runtime_error(error)),
         }
     }
 }
@@ -200,7 +202,7 @@ impl Planner {
         #[pyo3(from_py_with = crate::options::strings)] set: Vec<String>,
     ) -> PyResult<Planner> {
         let perception = self::perception(perception, behavior)?;
-        perception.check_image_size(image_size).map_err(mistake)?;
+        perception.check_image_size(image_size).map_err(value_error)?;
         let policy = ExternalPolicy::default();
         let rules = rule_set(rules, &set)?.planner;
         let agent = CorePlanningAgent::with_perception(policy, rules, &*perception);
@@ -270,7 +272,7 @@ impl Planner {
         if rows.is_empty() {
             return PyArray1::from_vec(py, Vec::new()).reshape([0, PLAN_FEATURES.len()]);
         }
-        PyArray2::from_vec2(py, &rows).map_err(failure)
+        PyArray2::from_vec2(py, &rows).map_err(runtime_error)
     }
 
     /// Draws the memory as an egocentric top view, heading up: uint8 [channels, side, side], with the channels of
@@ -283,7 +285,7 @@ impl Planner {
         cell_m: f32,
     ) -> PyResult<Bound<'py, PyArray3<u8>>> {
         if !(0.01..=10.0).contains(&cell_m) {
-            return Err(mistake(format!("cell_m is {cell_m}, expected 0.01 to 10 meters")));
+            return Err(value_error(format!("cell_m is {cell_m}, expected 0.01 to 10 meters")));
         }
         let map = EgocentricMap { side, cell_m };
         let mut out = vec![0; map.len()];
@@ -304,7 +306,7 @@ impl Planner {
         let policy = self.agent()?.policy_mut();
         let n = policy.valid().len();
         if !policy.set_plan(index) {
-            return Err(no_such("plan", index, n));
+            return Err(index_error("plan", index, n));
         }
         self.next_action(py)
     }
@@ -354,7 +356,7 @@ impl Detector {
     fn new(weights: Option<&[u8]>) -> PyResult<Detector> {
         match weights {
             None => Ok(Detector(TrainedDetector::built_in())),
-            Some(bytes) => TrainedDetector::from_bytes(bytes).map(Detector).map_err(mistake),
+            Some(bytes) => TrainedDetector::from_bytes(bytes).map(Detector).map_err(value_error),
         }
     }
 
@@ -368,10 +370,12 @@ impl Detector {
         let observation = &observation.get().0;
         let (Some(rgb), Some(depth_m)) = (&observation.images.rgb, &observation.images.depth_m)
         else {
-            return Err(mistake("the observation has no color or no depth"));
+            return Err(value_error("the observation has no color or no depth"));
         };
         if !self.0.fits(&observation.camera) {
-            return Err(mistake("width and height of the image must be multiples of 32 pixels"));
+            return Err(value_error(
+                "width and height of the image must be multiples of 32 pixels",
+            ));
         }
         let detections =
             py.detach(|| self.0.detect(rgb, depth_m, &observation.camera, &mut self.0.inference()));

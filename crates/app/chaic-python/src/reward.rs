@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use chaic_env::{RewardTerms, RewardWeights};
 use pyo3::prelude::*;
 
-use crate::error::mistake;
+use crate::error::value_error;
 
 /// Access to the weight of a term.
 type WeightField = fn(&mut RewardWeights) -> &mut f64;
@@ -32,7 +32,9 @@ pub fn parse_weights(by_name: &BTreeMap<String, f64>) -> PyResult<RewardWeights>
     for (name, weight) in by_name {
         let Some((_, field)) = FIELDS.iter().find(|(known, _)| known == name) else {
             let known = FIELDS.map(|(name, _)| name).join(", ");
-            return Err(mistake(format!("unknown reward term {name:?}; the terms are {known}")));
+            return Err(value_error(format!(
+                "unknown reward term {name:?}; the terms are {known}"
+            )));
         };
         *field(&mut weights) = *weight;
     }

@@ -9,11 +9,11 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use crate::error::failure;
+use crate::error::runtime_error;
 
 /// Process that loaded the module.
 static LOADED_BY: OnceLock<u32> = OnceLock::new();
-/// Pool of this forked process; pools of its parents are not used again.
+/// Thread pool of this forked process, with the process id. A pool of a parent process is not used.
 static FORKED_POOL: Mutex<Option<(u32, &'static ThreadPool)>> = Mutex::new(None);
 
 /// Stores the id of this process when the module is loaded.
@@ -38,7 +38,7 @@ pub fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyR
     let pool = match *forked_pool {
         Some((owner, pool)) if owner == id => pool,
         _ => {
-            let built = ThreadPoolBuilder::new().build().map_err(failure)?;
+            let built = ThreadPoolBuilder::new().build().map_err(runtime_error)?;
             let pool: &'static ThreadPool = Box::leak(Box::new(built));
             *forked_pool = Some((id, pool));
             pool
@@ -54,7 +54,7 @@ pub fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyR
 /// `RuntimeError` in such a process.
 pub fn refuse_fork() -> PyResult<()> {
     if is_forked() {
-        return Err(failure(
+        return Err(runtime_error(
             "this process was forked from one that had loaded chaic; start it with spawn instead",
         ));
     }

@@ -18,10 +18,10 @@ use pythonize::depythonize;
 use crate::action;
 use crate::episode::{Episode, encode_png};
 use crate::error::{
-    ANY_NUMBER, agent_number, failure, from_env, integer, mistake, no_attribute, not_picklable,
-    poisoned,
+    ANY_NUMBER, agent_number, from_env, integer, no_attribute, not_picklable, poisoned,
+    runtime_error, value_error,
 };
-use crate::observation::{Briefing, Observation, arrays, plain};
+use crate::observation::{Briefing, Observation, arrays, to_python};
 use crate::options::{IMAGE_SIZES, Options, sensors, strings};
 use crate::threads::detached;
 
@@ -44,7 +44,7 @@ pub fn outcome_name(outcome: AdvanceOutcome) -> &'static str {
 
 /// Converts the terms of a reward to a dictionary.
 pub fn reward<'py>(py: Python<'py>, terms: Option<RewardTerms>) -> PyResult<Bound<'py, PyAny>> {
-    plain(py, &terms)
+    to_python(py, &terms)
 }
 
 /// Returns the score so far as a dictionary.
@@ -89,7 +89,7 @@ impl World {
         if usize::from(agent) < n {
             return Ok(AgentId(agent));
         }
-        Err(mistake(format!("there is no agent {agent} of {n}")))
+        Err(value_error(format!("there is no agent {agent} of {n}")))
     }
 }
 
@@ -184,7 +184,7 @@ impl World {
         })?;
         match interrupt {
             Some(error) => Err(error),
-            None => outcome.map(outcome_name).map_err(failure),
+            None => outcome.map(outcome_name).map_err(runtime_error),
         }
     }
 
@@ -213,7 +213,7 @@ impl World {
         let id = self.agent(agent)?;
         let env = self.env()?;
         let observation = detached(py, || env.observe(id).cloned())?;
-        observation.map(Observation).ok_or_else(|| failure(not_waiting(agent)))
+        observation.map(Observation).ok_or_else(|| runtime_error(not_waiting(agent)))
     }
 
     /// Sets the next action of an agent that needs one: a string or dictionary as in docs/subprocess-helpers.md, or a
@@ -233,7 +233,7 @@ impl World {
         let env = self.env()?;
         match detached(py, || env.submit(id, action))? {
             true => Ok(()),
-            false => Err(failure(not_waiting(agent))),
+            false => Err(runtime_error(not_waiting(agent))),
         }
     }
 
@@ -270,7 +270,7 @@ impl World {
         let horizon = env.world().setup().horizon.max(1) as f32;
         let observed =
             detached(py, || env.observe(id).map(|o| (o.frame, o.proprioception.clone())))?;
-        let (frame, proprioception) = observed.ok_or_else(|| failure(not_waiting(agent)))?;
+        let (frame, proprioception) = observed.ok_or_else(|| runtime_error(not_waiting(agent)))?;
         let values = action::proprioception_values(&proprioception, frame as f32 / horizon);
         let mask = action::mask(&proprioception);
         Ok((PyArray1::from_slice(py, &values), PyArray1::from_slice(py, &mask)))
@@ -297,7 +297,7 @@ impl World {
     fn take_events<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let events = PyList::empty(py);
         for event in std::mem::take(&mut self.events) {
-            events.append(plain(py, &event)?)?;
+            events.append(to_python(py, &event)?)?;
         }
         Ok(events.into_any())
     }
@@ -335,10 +335,10 @@ impl World {
         images: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         if camera.is_some() && agent.is_some() {
-            return Err(mistake("give an agent or a camera"));
+            return Err(value_error("give an agent or a camera"));
         }
         if camera.is_some() && image_size.is_some() {
-            return Err(mistake("a camera has its own width and height; give no image_size"));
+            return Err(value_error("a camera has its own width and height; give no image_size"));
         }
         let agent = agent.map(agent_number).transpose()?;
         let image_size = image_size.map(crate::options::image_size).transpose()?;
@@ -418,16 +418,16 @@ fn not_waiting(agent: u8) -> String {
 /// Parses a camera, and checks that it has a valid image size and a view.
 fn parse_camera(camera: &Bound<'_, PyAny>) -> PyResult<Camera> {
     for side in ["width", "height"] {
-        // The parser reports a missing side.
+        // If a side is missing, the parser below reports it.
         if let Ok(value) = camera.get_item(side) {
             integer(side, &value, &IMAGE_SIZES)?;
         }
     }
-    let camera: Camera = depythonize(camera).map_err(mistake)?;
+    let camera: Camera = depythonize(camera).map_err(value_error)?;
     if Projection::from_camera(&camera).is_some() {
         return Ok(camera);
     }
-    Err(mistake(
+    Err(value_error(
         "the camera has no view: eye_in_world is finite, world_from_camera a rotation and \
          vertical_fov_rad between 0.01 and 3.1",
     ))

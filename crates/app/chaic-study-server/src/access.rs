@@ -61,7 +61,7 @@ pub fn is_host_name(text: &str) -> bool {
     !name.is_empty() && name.chars().all(is_valid) && port.parse::<u16>().is_ok_and(|port| port > 0)
 }
 
-/// SHA-256 of a participant's token. The page alone has the token.
+/// SHA-256 of a participant's token. Only the page stores the token itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TokenDigest(String);
 
@@ -95,7 +95,7 @@ fn is_hex(text: &str) -> bool {
     text.len() == TOKEN_DIGITS && text.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'))
 }
 
-/// Returns the value of a header that a request has once.
+/// Returns the value of a header that occurs exactly once in a request.
 fn only<'a>(headers: &'a HeaderMap, name: &HeaderName) -> Option<&'a str> {
     let mut values = headers.get_all(name).iter();
     let value = values.next()?.to_str().ok()?;

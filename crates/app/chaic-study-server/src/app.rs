@@ -18,7 +18,7 @@ use crate::refusal::Refusal;
 use crate::sessions::Sessions;
 use crate::store::Store;
 
-/// Clock of the server, seconds from any start. Data contain no time.
+/// Clock of the server, seconds since an arbitrary start. Stored data contain no times.
 pub type Clock = Box<dyn Fn() -> u64 + Send + Sync>;
 /// Receiver of problems that the researcher should see.
 pub type Reporter = Box<dyn Fn(&str) + Send + Sync>;
@@ -45,13 +45,14 @@ pub struct App {
 pub struct Play {
     /// Open episodes.
     pub sessions: Sessions,
-    /// Digest of the page, which stands for that of the study in answers.
+    /// Digest of the page. Answers contain it in place of the digest of the study.
     pub page_digest: String,
     /// Permits of the threads that simulate and draw.
     pub threads: Arc<Semaphore>,
 }
 
-/// Returns the number of threads that simulate and draw. Threads that wait for other processes need no core.
+/// Returns the number of threads that simulate and render. With helpers in other processes there are more
+/// threads than cores, because some only wait.
 pub fn n_play_threads(has_own_helpers: bool) -> usize {
     let n_cores = available_parallelism().map_or(1, NonZeroUsize::get);
     if has_own_helpers { n_cores + WAITING_THREADS } else { n_cores }
@@ -75,7 +76,7 @@ pub async fn read_text(body: Body, max_bytes: usize) -> Result<String, Response>
         let text = format!("the request is incomplete or longer than {max_bytes} bytes");
         refuse(StatusCode::PAYLOAD_TOO_LARGE, &text)
     };
-    // A length in the headers is compared before anything is read.
+    // A length in the headers is checked before the body is read.
     if body.size_hint().lower() > max_bytes as u64 {
         return Err(refused());
     }
@@ -90,8 +91,8 @@ pub fn server_failure(app: &App) -> Response {
     refuse(StatusCode::INTERNAL_SERVER_ERROR, "the server has failed")
 }
 
-/// Closes the episode of a participant after a panic. A repetition would fail again, so the answer lets the page go
-/// on with the next episode.
+/// Closes the episode of a participant after a panic. A repetition would fail again, so the page continues with the
+/// next episode after this answer.
 pub fn episode_failure(app: &App, code: &str) -> Response {
     if let Some(play) = &app.play {
         play.sessions.close(code);
@@ -100,7 +101,7 @@ pub fn episode_failure(app: &App, code: &str) -> Response {
     refuse(StatusCode::UNPROCESSABLE_ENTITY, "the episode cannot go on")
 }
 
-/// Answers with a refusal, and reports those that the researcher can remedy.
+/// Answers with a refusal, and reports refusals that need an action of the researcher.
 pub fn refusal_response(app: &App, refusal: &Refusal) -> Response {
     let status = match refusal {
         Refusal::Unknown => StatusCode::NOT_FOUND,

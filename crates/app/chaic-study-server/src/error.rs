@@ -36,12 +36,12 @@ pub enum ServerError {
     /// A condition has a helper that the server does not have.
     #[error(transparent)]
     Helper(#[from] EnvError),
-    /// A name is none of a server.
+    /// A name is not a valid host name.
     #[error(
         "`{0}` is no name of a server; expected a name such as study.example.org, without https://"
     )]
     HostName(String),
-    /// The address is that of all networks, so that the name in browsers is unknown.
+    /// The address stands for all networks, so the name that browsers use is unknown.
     #[error("the address {0} needs a name that browsers use; add --host NAME")]
     NoHostName(SocketAddr),
     /// The system refuses to listen or to start threads.

@@ -1,9 +1,9 @@
 //! Server of a study with people: serves its page, gives out slots and stores records.
 //!
 //! **What it is**: a [`StudyServer`] answers the requests of the page of a study. `store` has the participants
-//! with their slots and files, without HTTP and with time as a parameter; `routes` translates requests. If the
-//! simulator of the study runs on the server, `sessions` has the episodes that participants play: the same
-//! `chaic_web::LiveSession` as in a page.
+//! with their slots and files, independent of HTTP and of a clock (time is a parameter); `routes` translates
+//! requests. If the simulator of the study runs on the server, `sessions` has the episodes that participants
+//! play: the same `chaic_web::LiveSession` as in a page.
 //!
 //! **What it is not**: it exports nothing, knows no names of participants and writes no log of requests.
 //!

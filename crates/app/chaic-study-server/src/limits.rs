@@ -1,4 +1,5 @@
-//! Limits of the server. Each bounds what one request, one participant or all together can use.
+//! Limits of the server. Each limit applies to one request, one participant or all participants
+//! together.
 
 use std::time::Duration;
 
@@ -26,29 +27,31 @@ pub const STOP_TIMEOUT: Duration = Duration::from_secs(10);
 pub const WRITER_THREADS: usize = 16;
 /// Additional threads that simulate, if helpers of the study are other processes.
 pub const WAITING_THREADS: usize = 32;
-/// Requests of one participant. The page sends one at a time, with all records that wait.
+/// Rate of requests of one participant. The page sends one request at a time, with all waiting
+/// records.
 pub const PARTICIPANT_RATE: Rate = Rate { burst: 100, per_sec: 20 };
-/// New participants: a class that begins at once, then five a second.
+/// Rate of new participants: a school class that begins at once, then five a second.
 pub const ENTRY_RATE: Rate = Rate { burst: 200, per_sec: 5 };
 
 /// Maximum size of the body of a turn, bytes: a plan has less than 200 characters.
 pub const MAX_TURN_BYTES: usize = 4 << 10;
 /// Maximum number of frames of a turn: a second at the highest speed.
 pub const MAX_TURN_FRAMES: u32 = 240;
-/// Largest side of a picture, pixels, and step of sides. Helpers see pictures of the largest size.
+/// Maximum side of a picture, and the step between valid sides, pixels. Helpers see pictures of the
+/// largest size.
 pub const VIEW_PX: [u32; 2] = [512, 64];
-/// Turns of one participant. The page asks for at most 14 pictures a second.
+/// Rate of turns of one participant. The page asks for at most 14 pictures a second.
 pub const TURN_RATE: Rate = Rate { burst: 60, per_sec: 20 };
 /// Maximum number of episodes in memory: see the measured size of an episode in docs/studies.md.
 pub const MAX_SESSIONS: usize = 200;
 /// Time without a turn after which an episode leaves the memory, seconds.
 pub const SESSION_IDLE_SECS: u64 = 300;
-/// Interval at which such episodes are looked for.
+/// Interval of the search for such episodes.
 pub const IDLE_INTERVAL: Duration = Duration::from_secs(30);
 /// Simulated time after which the trace of a running episode is stored, also without a decision, frames.
 pub const RECORD_FRAMES: u32 = 15;
 
-/// Limit of a rate.
+/// Limit of a request rate.
 #[derive(Clone, Copy, Debug)]
 pub struct Rate {
     /// Maximum number at once.

@@ -19,10 +19,10 @@ use crate::limits::{MAX_FILE_BYTES, MAX_RECORDS, PARTICIPANT_RATE};
 use crate::refusal::Refusal;
 use crate::token_bucket::TokenBucket;
 
-/// Begin of a line of a trace, as [`DataRecord::to_line`] and pages write it.
+/// Start of a line with a part of a trace, as [`DataRecord::to_line`] and pages write it.
 const TRACE_BEGIN: &str = "{\"type\":\"trace\",";
 
-/// Ending of files with the digest of a token. An export does not read them.
+/// Extension of files with the digest of a token. An export ignores these files.
 const TOKEN_ENDING: &str = "token";
 
 /// Returns the path of the token of the participant with this file.
@@ -35,7 +35,7 @@ pub struct Log {
     path: PathBuf,
     check: RecordCheck,
     n_records: usize,
-    /// Number of records that the page has too: without traces if the server writes them.
+    /// Number of records that the page has, too. Traces do not count if the server writes them.
     n_page_records: usize,
     n_bytes: usize,
     /// True after a failed write, which may have left bytes behind.
@@ -44,7 +44,7 @@ pub struct Log {
 }
 
 impl Log {
-    /// Creates the file with its first line, after that of the token.
+    /// Creates the token file, then the data file with its first line.
     pub fn create(
         path: PathBuf,
         check: RecordCheck,
@@ -56,7 +56,7 @@ impl Log {
         remove_if_present(&token_path)?;
         write_new_private(&token_path, token.to_line().as_bytes())?;
         if let Err(error) = write_new_private(&path, start.as_bytes()) {
-            // If the removal fails too, the next start of the server removes it.
+            // If the removal fails as well, the next start of the server removes the file.
             let _ = remove_file(&token_path);
             return Err(error.into());
         }
@@ -65,8 +65,8 @@ impl Log {
         Ok(Log { path, check, n_records, n_page_records, n_bytes, is_torn: false, bucket })
     }
 
-    /// Reads the file of a participant, without an incomplete last line, and removes that line. Returns the slot
-    /// too.
+    /// Reads the file of a participant, without an incomplete last line, and removes that line. Also returns the
+    /// slot.
     pub fn read(plan: &StudyPlan, code: &str, path: &Path, now_secs: u64) -> Result<(Log, u32)> {
         let wrong = |line: usize, problem: String| ServerError::Data {
             path: path.to_owned(),
@@ -103,7 +103,7 @@ impl Log {
         Ok((log, data.slot))
     }
 
-    /// Returns the number of stored records that the page has too.
+    /// Returns the number of stored records that the page has, too.
     pub fn n_page_records(&self) -> usize {
         self.n_page_records
     }
@@ -266,7 +266,7 @@ impl Log {
         let written = write();
         self.is_torn = written.is_err();
         if written.is_err() {
-            // If this fails too, the next write shortens the file.
+            // If this fails as well, the next write truncates the file.
             let _ = file.set_len(expected);
         }
         Ok(written.map_err(FileError::context("write", &self.path))?)
@@ -282,7 +282,7 @@ fn refusal_of(error: FileError) -> Refusal {
     }
 }
 
-/// Returns whether a stored line is one that the page has too.
+/// Returns whether the page has this stored line, too.
 fn is_of_page(plan: &StudyPlan, line: &str) -> bool {
     plan.study().play.simulator == Simulator::Page || !line.starts_with(TRACE_BEGIN)
 }

@@ -1,4 +1,4 @@
-//! Pictures for a page: PNG, which loses nothing.
+//! Pictures for a page, as lossless PNG.
 
 use std::io;
 

@@ -58,7 +58,7 @@ async fn turn(
         return no_such_page();
     };
     let (parts, body) = request.into_parts();
-    // The sender is known before the body is read.
+    // The sender is checked before the body is read.
     if let Err(refusal) = allowed(&app, &code, &parts.headers, trial) {
         return refusal_response(&app, &refusal);
     }
@@ -109,7 +109,7 @@ async fn simulate<T: Send + 'static>(
     let permit = Arc::clone(&play.threads).acquire_owned().await.expect("it is never closed");
     let (shared, participant) = (Arc::clone(&app), code.clone());
     let work = move || {
-        // The thread is taken until the work ends, also if nobody waits for the answer.
+        // The permit is held until the work ends, even if the client has disconnected.
         let _permit = permit;
         perform(&shared, &play, &code, &token)
     };

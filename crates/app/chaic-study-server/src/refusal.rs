@@ -7,20 +7,20 @@ use chaic_web::LiveError;
 /// Reason of a refusal. The text is for the participant.
 #[derive(Debug, thiserror::Error)]
 pub enum Refusal {
-    /// There is no participant with this code, or no more.
+    /// There is no participant with this code, or the participant was deleted.
     #[error("the server has no data of this participant")]
     Unknown,
-    /// The token is missing or another one.
+    /// The token is missing or wrong.
     #[error("the token is not that of the participant")]
     Token,
     /// All slots are taken or done.
     #[error("all places of the study are taken")]
     Full,
     /// Too many requests in a short time.
-    #[error("too many requests; repeat it in a second")]
+    #[error("too many requests; repeat the request in a second")]
     Rate,
     /// Records are missing between the stored and the sent ones.
-    #[error("records from {stored} on are missing")]
+    #[error("the server has {stored} records; the next ones are missing")]
     Gap {
         /// Number of stored records.
         stored: usize,
@@ -54,20 +54,21 @@ pub enum Refusal {
     /// The content of a turn is invalid.
     #[error("the turn is invalid: {0}")]
     Input(String),
-    /// The file of a participant is sent after the end alone: traces contain the goals.
+    /// The participant has not finished. The file is sent only after the end, because traces
+    /// contain the goals.
     #[error("the data can be read at the end of the study")]
     Unfinished,
     /// Too many participants play at once.
-    #[error("too many episodes are played at once; repeat it later")]
+    #[error("too many episodes are played at once; repeat the request later")]
     Busy,
     /// The simulator or the helper has a problem, which the researcher sees.
     #[error("the episode cannot go on")]
     Simulator(LiveError),
     /// An earlier request for the episode is not answered yet.
-    #[error("an earlier request is not answered yet; repeat it in a second")]
+    #[error("an earlier request is not answered yet; repeat this request in a second")]
     InProgress,
-    /// The server ends while the helper decides. The episode goes on after the next start.
-    #[error("the server ends; repeat it after its next start")]
+    /// The server stops while the helper decides. The episode continues after the next start.
+    #[error("the server is stopping; repeat the request after its next start")]
     Ending,
     /// The file of the participant was changed while the server ran.
     #[error("another program has changed the file of the participant")]

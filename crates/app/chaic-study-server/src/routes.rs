@@ -32,7 +32,7 @@ use crate::app::{
 use crate::limits::{MAX_BODY_BYTES, REQUEST_TIMEOUT};
 use crate::play_routes;
 use crate::refusal::Refusal;
-use crate::store::Entered;
+use crate::store::EntryAnswer;
 
 /// Headers of all answers, beside the policy.
 const HEADERS: [(HeaderName, &str); 5] = [
@@ -92,12 +92,12 @@ async fn enter(
     headers: HeaderMap,
 ) -> Response {
     respond(app, code, &headers, StatusCode::CREATED, |app, code, token| {
-        let Entered { start, slot, stored } = app.store.enter(code, token, (app.clock)())?;
+        let EntryAnswer { start, slot, stored } = app.store.enter(code, token, (app.clock)())?;
         let start = match &app.play {
             Some(play) => DataRecord::start(&play.page_digest, code, slot).to_line(),
             None => start,
         };
-        // The line as it is: a parsed one would lose the order of its keys.
+        // The line is inserted as text, because parsing would lose the order of its keys.
         Ok(format!("{{\"start\":{},\"stored\":{stored}}}", start.trim_end()))
     })
     .await
@@ -139,7 +139,7 @@ async fn append(
     let Some(from) = from.parse::<usize>().ok().filter(|_| is_number) else {
         return no_such_page();
     };
-    // The sender is known before the body is read.
+    // The sender is checked before the body is read.
     let token = TokenDigest::of_request(&parts.headers);
     if let Err(refusal) =
         token.ok_or(Refusal::Token).and_then(|token| app.store.authorize(&code, &token))

@@ -38,7 +38,7 @@ use crate::write_timeout::WriteTimeout;
 
 /// Threads that handle requests.
 const THREADS: usize = 2;
-/// Interval at which the flag is read that ends the server.
+/// Interval at which the stop flag is read.
 const STOP_INTERVAL: Duration = Duration::from_millis(50);
 /// Pause after a connection that the system refused, for example without free descriptors.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(50);
@@ -65,7 +65,7 @@ pub struct StudyServer {
 impl StudyServer {
     /// Opens the folder of the data, builds the page and listens. Requests are answered by [`StudyServer::run`].
     ///
-    /// `helpers` creates the helpers beside persons, if the simulator runs on the server.
+    /// `helpers` creates the helpers of the conditions, if the simulator runs on the server.
     ///
     /// # Errors
     /// [`ServerError`].
@@ -146,7 +146,8 @@ impl StudyServer {
     }
 }
 
-/// Returns whether a helper follows rules in this process. Others may wait for a process of their own.
+/// Returns whether a helper is built in, so that it decides in this process. Other helpers may wait
+/// for another process.
 fn is_built_in(name: &str) -> bool {
     name == NONE || BuiltInHelpers.names().iter().any(|known| known == name)
 }
@@ -196,7 +197,7 @@ async fn serve(listener: tokio::net::TcpListener, router: Router, stop: &AtomicB
         let stream = TokioIo::new(WriteTimeout::new(stream, WRITE_TIMEOUT));
         let connection = connections.watch(http.serve_connection(stream, service));
         tokio::spawn(async move {
-            // A broken connection concerns its client alone, who repeats the request.
+            // A broken connection affects only its client, which repeats the request.
             let _ = connection.await;
             drop(permit);
         });
@@ -205,8 +206,8 @@ async fn serve(listener: tokio::net::TcpListener, router: Router, stop: &AtomicB
     let _ = timeout(STOP_TIMEOUT, connections.shutdown()).await;
 }
 
-/// Returns the policy of the page: its own script, requests to this server alone, and, unless the simulator runs
-/// on the server, its module and worker.
+/// Returns the content security policy of the page. It allows the page's script and requests to this server.
+/// Unless the simulator runs on the server, it also allows module and worker.
 fn policy(is_simulated_here: bool) -> HeaderValue {
     let hash = STANDARD.encode(Sha256::digest(study_script()));
     let simulator =

@@ -1,5 +1,5 @@
-//! Episodes that participants play while the simulator runs on the server. It knows no HTTP, and time is a
-//! parameter.
+//! Episodes that participants play while the simulator runs on the server. The module is independent of
+//! HTTP, and time is a parameter.
 //!
 //! A participant has at most one open episode. Its turns have numbers, so that a repeated turn changes nothing.
 //! An episode that is not open, for example after a restart of the server, is opened again from its stored trace.
@@ -61,7 +61,8 @@ impl Turn {
         Err(Refusal::Input(problem))
     }
 
-    /// Returns whether an action names an object by its id. The picture alone reveals no ids.
+    /// Returns whether an action names an object by its id. A person who sees only the picture
+    /// knows no ids.
     fn names_object(&self) -> bool {
         match &self.input {
             Some(LiveInput::Action(action)) => {
@@ -92,7 +93,7 @@ struct Game {
     session: LiveSession,
     /// Number of the next turn.
     next: u64,
-    /// Number of the turn that has advanced the world, but may not be stored.
+    /// Number of the turn that has advanced the world, but whose trace may not be stored yet.
     advanced: Option<u64>,
     /// Answer to the last turn.
     answer: Option<Bytes>,
@@ -103,7 +104,7 @@ struct Game {
 }
 
 impl Sessions {
-    /// Creates a set without open episodes. The registry creates the helpers beside persons.
+    /// Creates a set without open episodes. The registry creates the helpers of the conditions.
     pub fn new(helpers: &'static dyn HelperRegistry) -> Sessions {
         Sessions { helpers, open: Mutex::default() }
     }
@@ -145,8 +146,8 @@ impl Sessions {
         if lock(&open.bucket).take(now_secs) { Ok(()) } else { Err(Refusal::Rate) }
     }
 
-    /// Performs the turn with a number and returns the state as a line of JSON and the picture (PNG). The last turn
-    /// has the same answer again.
+    /// Performs the turn with a number and returns the state as a line of JSON and the picture (PNG). If the last
+    /// turn is repeated, the answer is the same.
     ///
     /// # Errors
     /// The [`Refusal`]. A turn of which the trace cannot be stored can be repeated.
@@ -176,7 +177,7 @@ impl Sessions {
         done
     }
 
-    /// Closes the episode of a participant if it does not run in the stored data.
+    /// Closes the episode of a participant if the stored data show that it does not run.
     pub fn close_ended(&self, store: &Store, code: &str) {
         let open = lock(&self.open).get(code).cloned();
         if open.is_some_and(|open| !store.is_running(code, open.trial)) {
@@ -225,7 +226,8 @@ impl Sessions {
     }
 }
 
-/// Removes the episodes that have had no turn for [`SESSION_IDLE_SECS`] and simulate none now.
+/// Removes the episodes that have had no turn for [`SESSION_IDLE_SECS`] and have no turn in
+/// progress.
 fn take_idle(
     open: &mut BTreeMap<String, Arc<OpenSession>>,
     now_secs: u64,
@@ -239,7 +241,7 @@ fn take_idle(
     open.extract_if(.., |_, known| is_idle(known)).map(|(_, known)| known).collect()
 }
 
-/// Drops episodes on a thread of their own: the end of a helper's process can take seconds.
+/// Drops episodes in a new thread, because the end of a helper's process can take seconds.
 fn drop_later(closed: impl IntoIterator<Item = Arc<OpenSession>>) {
     let closed: Vec<Arc<OpenSession>> = closed.into_iter().collect();
     if !closed.is_empty() {
@@ -257,7 +259,7 @@ fn try_lock<T>(mutex: &Mutex<T>) -> Result<MutexGuard<'_, T>, Refusal> {
 }
 
 impl Game {
-    /// Starts an episode, or goes on with its stored trace.
+    /// Starts an episode, or continues its stored trace.
     fn new(
         plan: &StudyPlan,
         trial: Trial,
@@ -363,7 +365,7 @@ mod tests {
         }
         let now_secs = MAX_SESSIONS as u64 / 2;
         assert!(matches!(sessions.entry("new", 0, now_secs), Err(Refusal::Busy)));
-        // A participant who plays the next episode has one episode still.
+        // A participant who plays the next episode still has only one open episode.
         sessions.entry("0", 1, now_secs).expect("its own place");
         assert!(sessions.find("0", 0).is_err() && sessions.find("0", 1).is_ok());
         sessions.entry("new", 0, SESSION_IDLE_SECS).expect("the place of an idle participant");

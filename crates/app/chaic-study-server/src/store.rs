@@ -1,4 +1,5 @@
-//! Participants with their slots and files. It knows no HTTP, and time is a parameter.
+//! Participants with their slots and files. The module is independent of HTTP, and time is a
+//! parameter.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -19,15 +20,14 @@ use crate::log::{Log, token_path};
 use crate::refusal::Refusal;
 use crate::token_bucket::TokenBucket;
 
-/// Ending of the files of participants.
+/// Extension of the files of participants.
 const ENDING: &str = "jsonl";
 /// Seconds of a minute.
 const SECS_PER_MINUTE: u64 = 60;
 
 /// Participants of a study in a folder, which is locked.
 ///
-/// Slots follow from the files ([`lowest_free_slot`]). A server that starts again counts the time-outs from its
-/// start.
+/// Slots follow from the files ([`lowest_free_slot`]). After a restart of the server, time-outs start again.
 pub struct Store {
     plan: StudyPlan,
     folder: PathBuf,
@@ -54,7 +54,7 @@ struct Participant {
 
 /// Answer to a participant who enters.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Entered {
+pub struct EntryAnswer {
     /// Line of the first record.
     pub start: String,
     /// Slot.
@@ -113,7 +113,7 @@ impl Store {
         code: &str,
         token: &TokenDigest,
         now_secs: u64,
-    ) -> std::result::Result<Entered, Refusal> {
+    ) -> std::result::Result<EntryAnswer, Refusal> {
         let mut participants = lock(&self.participants);
         if let Some(known) = participants.by_code.get(code).cloned() {
             drop(participants);
@@ -122,7 +122,7 @@ impl Store {
             let log = log.as_mut().ok_or(Refusal::Unknown)?;
             log.take_token(now_secs)?;
             let (start, slot) = (log.first_line()?, known.slot);
-            return Ok(Entered { start, slot, stored: log.n_page_records() });
+            return Ok(EntryAnswer { start, slot, stored: log.n_page_records() });
         }
         if !participants.entry_bucket.take(now_secs) {
             return Err(Refusal::Rate);
@@ -145,7 +145,7 @@ impl Store {
         match Log::create(self.path(code), check, token, &start, now_secs) {
             Ok(created) => {
                 *log = Some(created);
-                Ok(Entered { start, slot, stored: 1 })
+                Ok(EntryAnswer { start, slot, stored: 1 })
             }
             Err(refusal) => {
                 lock(&self.participants).by_code.remove(code);
@@ -273,7 +273,7 @@ impl Store {
                 participant.is_complete.store(log.is_complete(), Ordering::Relaxed);
                 Ok(log.n_page_records())
             }
-            // Somebody has removed the file, for example by `chaic study delete`.
+            // Another program has removed the file, for example `chaic study delete`.
             Err(Refusal::Unknown) => {
                 *guard = None;
                 drop(guard);
@@ -336,7 +336,7 @@ impl Store {
         let holders = by_code.values().map(|participant| SlotHolder {
             slot: participant.slot,
             since_secs: participant.since_secs,
-            // A slot with the maximum number of participants is never free again.
+            // A slot that has had the maximum number of participants is never free again.
             is_complete: participant.is_complete.load(Ordering::Relaxed)
                 || n_by_slot[&participant.slot] >= PARTICIPANTS_PER_SLOT,
         });
@@ -357,21 +357,22 @@ impl Participant {
         })
     }
 
-    /// The digests of tokens are equal or differ at random, so the duration of the comparison reveals nothing.
+    /// Compares digests of tokens. Unequal digests differ at random positions, so the duration of the
+    /// comparison reveals nothing.
     fn authorize(&self, token: &TokenDigest) -> std::result::Result<(), Refusal> {
         if self.token.as_ref() == Some(token) { Ok(()) } else { Err(Refusal::Token) }
     }
 }
 
-/// Returns the code of a participant whose file has this path. Other files are not those of a server, but an
-/// export reads them.
+/// Returns the participant code in the path of a file; `None` for a file that no server has written, which
+/// only an export reads.
 fn code_of(path: &Path) -> Option<&str> {
     let is_data = path.extension().is_some_and(|ending| ending == ENDING);
     path.file_stem()?.to_str().filter(|stem| is_data && is_code(stem))
 }
 
 fn read_token(path: &Path) -> Result<Option<TokenDigest>> {
-    /// More than a digest has.
+    /// Maximum size of a token file, bytes: more than a digest needs.
     const MAX_BYTES: u64 = 128;
     if kind(path)? == EntryKind::Missing {
         return Ok(None);

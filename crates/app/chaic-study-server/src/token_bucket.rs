@@ -1,4 +1,4 @@
-//! Limit of a rate by a token bucket. Time is a parameter.
+//! Rate limit by a token bucket. Time is a parameter.
 
 use crate::limits::Rate;
 

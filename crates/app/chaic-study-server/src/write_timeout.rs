@@ -10,8 +10,8 @@ use tokio::time::{Sleep, sleep};
 
 /// Stream whose writes fail if the peer does not accept an answer in time.
 ///
-/// The time starts when the peer stops reading. It ends when all bytes are with the operating system, which is when
-/// the writer flushes. So a peer that reads a byte from time to time gains no time.
+/// The time starts when the peer stops reading. It ends when the operating system has all bytes, which is when the
+/// writer flushes. A peer therefore gains no time by reading a byte from time to time.
 pub struct WriteTimeout<S> {
     stream: S,
     limit: Duration,

@@ -42,13 +42,13 @@ impl Player {
     /// Opens a trace of an episode at its first frame.
     ///
     /// # Errors
-    /// If one of them is unreadable, or they do not belong together.
+    /// If trace or episode is unreadable, or they do not belong together.
     #[wasm_bindgen(constructor)]
     pub fn new(trace: &[u8], episode: &[u8]) -> Result<Player, JsError> {
         Ok(Player { player: ReplayPlayer::open(trace, episode).map_err(error)? })
     }
 
-    /// Re-simulates at most this many further frames; true once the re-simulation has ended.
+    /// Re-simulates at most `n_frames` further frames; returns true once the re-simulation has ended.
     pub fn verify(&mut self, n_frames: u32) -> bool {
         self.player.verify(n_frames)
     }
@@ -126,7 +126,7 @@ impl Live {
     /// Starts an episode, with a [`crate::LiveConfig`] as JSON.
     ///
     /// # Errors
-    /// If one of them is unreadable, or an agent does not exist.
+    /// If episode or configuration is unreadable, or an agent does not exist.
     #[wasm_bindgen(constructor)]
     pub fn new(episode: &[u8], config: &str) -> Result<Live, JsError> {
         let config = serde_json::from_slice(config.as_bytes()).map_err(error)?;
@@ -216,8 +216,8 @@ impl Live {
     }
 }
 
-/// Plays an episode as in a trace up to a frame, from which on a built-in helper decides. Returns the new
-/// trace.
+/// Plays an episode as in a trace up to a frame; after it, a built-in helper decides. Returns the
+/// new trace.
 ///
 /// # Errors
 /// If an input is unreadable, the helper does not exist, or the trace cannot be continued.

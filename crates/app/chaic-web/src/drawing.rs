@@ -30,7 +30,7 @@ pub struct DrawnMap {
     pub labels: Vec<CanvasLabel>,
 }
 
-/// Line of text in the terms of a canvas, with a monospaced font.
+/// Line of monospaced text for the text functions of a canvas.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CanvasLabel {
     /// The text.

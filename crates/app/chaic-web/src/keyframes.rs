@@ -1,14 +1,14 @@
-//! States of a replay at regular distances.
+//! States of a replay at regular intervals.
 
 use chaic_core::Frame;
 
-/// Distance between stored states, frames, unless the episode is long.
+/// Initial interval between stored states, frames; longer in long episodes.
 const INTERVAL: Frame = 100;
 /// Maximum number of stored states, an even number: it bounds the memory of long episodes.
 const MAX_STATES: usize = 256;
 
-/// States at multiples of an interval. The time to any frame is that of one interval. If the number of states
-/// reaches the maximum, the interval doubles.
+/// States at multiples of an interval. Any frame is at most one interval after a state. If the
+/// number of states reaches the maximum, the interval doubles.
 pub struct Keyframes<T> {
     interval: Frame,
     states: Vec<T>,
@@ -36,7 +36,7 @@ impl<T: Clone> Keyframes<T> {
         self.states.push(state.clone());
     }
 
-    /// Returns the state from which a frame is reached; `None` if that is the current state, of frame `now`.
+    /// Returns the stored state from which to reach a frame; `None` to start from the current state, at frame `now`.
     pub fn start_for(&self, frame: Frame, now: Frame) -> Option<&T> {
         let (wanted, current) = (frame / self.interval, now / self.interval);
         let is_reached_from_now = frame >= now && wanted <= current;

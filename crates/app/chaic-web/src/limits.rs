@@ -1,4 +1,4 @@
-//! Objects of the task, and the limits of the partner.
+//! Objects of the task, and the partner's limits that they exceed.
 
 use chaic_core::geom::to_xz;
 use chaic_core::{AgentId, Role};

@@ -27,7 +27,7 @@ mod reference;
 /// Name in traces of an agent that a person controls.
 pub const PERSON: &str = "human";
 
-/// Duration of a pause of a person who decides nothing while the world goes on, frames.
+/// Duration of one pause of a person who has not decided while the world goes on, frames.
 const PAUSE_FRAMES: u32 = 3;
 
 /// Reason why an episode cannot be played.
@@ -45,10 +45,10 @@ pub enum LiveError {
     /// The registry has no partner of this name.
     #[error("the partner `{0}` cannot act here")]
     NoPartner(String),
-    /// A person controls partner or helper.
+    /// The seat is neither partner nor helper.
     #[error("agent {0} has no seat for a person")]
     NoSeat(AgentId),
-    /// The agents act differently than in the trace, such as those of another version.
+    /// The agents act differently than in the trace, for example those of another version.
     #[error("the other agents do not act as in the trace; take over from an earlier frame")]
     Diverged,
 }
@@ -247,9 +247,9 @@ impl LiveSession {
         })
     }
 
-    /// Starts with the decisions of a trace (JSON lines) before a frame; then the person goes on with
-    /// the agent of the seat. The helper of the trace takes part if the person is the partner, and must be
-    /// built in.
+    /// Starts with the decisions of a trace (JSON lines) before a frame; then the person controls
+    /// the agent of the seat. The helper of the trace takes part if the person is the partner, and
+    /// must be built in.
     ///
     /// # Errors
     /// If trace or episode are unreadable, or the other agents do not act as in the trace.
@@ -285,8 +285,8 @@ impl LiveSession {
         Ok(session)
     }
 
-    /// Goes on with the trace (JSON lines) of a session with the same episode, configuration and helpers. The
-    /// person of an interrupted plan chooses again.
+    /// Continues the trace (JSON lines) of a session with the same episode, configuration and
+    /// helpers. After an interrupted plan, the person chooses again.
     ///
     /// # Errors
     /// If trace or episode are unreadable, or the session does not repeat the trace.
@@ -570,8 +570,8 @@ fn image_size_of_others(header: &Header, seat: AgentId) -> Option<u32> {
     others.next().map(|person| person.sensors.image_size)
 }
 
-/// Returns whether a person in this seat learns of an event: of what its agent does, and of deliveries
-/// if it is the partner.
+/// Returns whether a person in this seat learns of an event: of its own actions, joint lifts and
+/// the end; as partner, of deliveries.
 fn notices(seat: AgentId, event: &EventKind) -> bool {
     match *event {
         EventKind::Delivered { by, .. } => by == seat || seat == AgentId::PARTNER,

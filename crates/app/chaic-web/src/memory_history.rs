@@ -14,10 +14,10 @@ use chaic_render::floor_plan;
 use chaic_world::World;
 use serde::Serialize;
 
-/// Maximum number of stored changes of maps, 12 bytes each: far above those of an episode.
+/// Maximum number of stored changes of maps, 12 bytes each: far more than an episode has.
 const MAX_CHANGES: usize = 4 << 20;
-/// Maximum number of objects, people and points of paths in all stored memories, about 100 bytes each: far above
-/// that of an episode of ordinary length.
+/// Maximum number of objects, people and points of paths in all stored memories, about 100 bytes
+/// each: far more than an episode of ordinary length has.
 const MAX_REMEMBERED: usize = 2 << 20;
 
 /// Agreement of an agent that runs again with the replay.
@@ -29,7 +29,7 @@ pub struct RerunInfo {
     pub is_available: bool,
     /// Number of decisions that equal the recorded ones.
     pub n_equal: usize,
-    /// Frame of the first decision that differs; nothing is known from there on.
+    /// Frame of the first decision that differs; later memories are unknown.
     pub differs_at: Option<Frame>,
 }
 
@@ -39,13 +39,13 @@ pub struct RerunInfo {
 pub struct MemoryState {
     /// The agent.
     pub agent: AgentId,
-    /// Frame of the decision from which the memory is.
+    /// Frame of the decision at which the memory was stored.
     pub frame: Frame,
     /// Seen area of the place, square meters.
     pub seen_m2: f32,
-    /// Position of the first cell of the map with the smallest coordinates.
+    /// Position of the corner of the first cell with the smallest coordinates.
     pub map_at: [f32; 2],
-    /// Side of a cell.
+    /// Side of a cell, relative to the map's width.
     pub cell: f32,
     /// Number of cells in a row.
     pub n_columns: usize,
@@ -76,7 +76,7 @@ pub struct PlacedObject {
     pub wanted: Option<u16>,
 }
 
-/// Memories of both agents up to the frame that they have reached.
+/// Memories of both agents up to the frame that the agents have reached.
 pub struct MemoryHistory {
     rerun: AgentRerun<Arc<Trace>>,
     is_complete: bool,
@@ -121,7 +121,7 @@ impl MemoryHistory {
     /// Runs the agents until the next decision. Returns false at the end.
     pub fn run_to_decision(&mut self) -> bool {
         while !self.is_complete {
-            // An altered trace is replayed up to the frame that differs, and so are its agents.
+            // The agents run up to the frame in which an altered trace differs.
             let Ok(Some(moments)) = self.rerun.step() else {
                 self.is_complete = true;
                 break;

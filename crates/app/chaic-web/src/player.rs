@@ -52,7 +52,7 @@ pub struct ReplayInfo {
     pub seed: u32,
     /// Version of the program that wrote the trace.
     pub chaic: String,
-    /// Frame from which it continues another trace, if it does.
+    /// Frame from which this trace continues another trace, if any.
     pub branch_at: Option<Frame>,
     /// Helpers that can take over; empty if an agent of the trace cannot act again in a page.
     pub successors: Vec<String>,
@@ -137,9 +137,9 @@ pub struct FrameState {
 /// State of the agents that run again beside the replay.
 #[derive(Clone, Debug, Serialize)]
 pub struct RerunState {
-    /// Frame that they have reached.
+    /// Frame that these agents have reached.
     pub frame: Frame,
-    /// True if they run no further.
+    /// True if the agents run no further.
     pub is_complete: bool,
     /// Agreement of each agent with the replay.
     pub agents: Vec<RerunInfo>,
@@ -148,10 +148,10 @@ pub struct RerunState {
 /// Re-simulation of a trace with a movable position.
 pub struct ReplayPlayer {
     scene: Scene,
-    /// Map of the last drawn width.
+    /// Map at the width that was drawn last.
     plan: Option<FloorPlan>,
     current: Playback<Arc<Trace>>,
-    /// State at the last frame that is verified.
+    /// State at the last verified frame.
     verified: Playback<Arc<Trace>>,
     keyframes: Keyframes<Playback<Arc<Trace>>>,
     timeline: Timeline,

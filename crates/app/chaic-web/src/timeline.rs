@@ -40,7 +40,7 @@ pub struct Delivery {
     pub done: f64,
 }
 
-/// Everything that happens in an episode.
+/// Activities, events and deliveries of an episode.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Timeline {
     /// Activities in the order of their ends.
@@ -49,7 +49,7 @@ pub struct Timeline {
     pub story: Vec<StoryLine>,
     /// Deliveries in chronological order.
     pub deliveries: Vec<Delivery>,
-    /// Start of the current action of each agent.
+    /// Agents with the first frame of their current action.
     #[serde(skip)]
     started: Vec<(AgentId, Frame)>,
 }

@@ -229,7 +229,9 @@ fn seed_range(text: &str) -> Result<Range<u64>, String> {
         Ok(Split::Generated(seeds)) => Ok(seeds),
         _ => {
             let max = SeedRange::BUNDLED_TRAIN.first;
-            Err(format!("no range `{text}`; write A..B with A < B <= {max}, for example 0..10"))
+            Err(format!(
+                "`{text}` is not a range; write A..B with A < B <= {max}, for example 0..10"
+            ))
         }
     }
 }

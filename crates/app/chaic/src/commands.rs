@@ -82,9 +82,9 @@ fn all_partner_names() -> Vec<String> {
     partner_names().into_iter().chain(bundled).collect()
 }
 
-/// Returns the number of threads: as given, or one per core.
+/// Returns the number of parallel jobs: the given number, or one per core.
 fn jobs(given: Option<u16>) -> usize {
-    /// More threads than the cores of any machine.
+    /// Maximum number of jobs: more than the cores of any machine.
     const MAX_JOBS: usize = 1024;
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
     given.map_or_else(cores, usize::from).min(MAX_JOBS)
@@ -97,7 +97,7 @@ fn jobs(given: Option<u16>) -> usize {
 fn start_threads(jobs: usize) -> Result<()> {
     // More threads than jobs would only wait.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build_global();
-    // The text of this error has its cause.
+    // The text of this error already contains its cause.
     pool.map_err(|error| anyhow::anyhow!("can't start threads: {error}"))
 }
 
@@ -113,7 +113,7 @@ fn table<const N: usize>(header: [&str; N]) -> Table {
 /// Writes a report to the file of `--json`, if given.
 ///
 /// # Errors
-/// If the file system refuses.
+/// If the file cannot be written.
 fn write_json(path: Option<&Path>, report: &impl Serialize) -> Result<()> {
     if let Some(path) = path {
         let json = serde_json::to_string_pretty(report).expect("reports serialize") + "\n";
@@ -122,7 +122,7 @@ fn write_json(path: Option<&Path>, report: &impl Serialize) -> Result<()> {
     Ok(())
 }
 
-/// Reports that a command was stopped that has no partial result, and returns its end.
+/// Reports that a command without partial results was stopped, and returns its exit status.
 fn stopped_without_result() -> ExitStatus {
     print_error("stopped; nothing was written");
     ExitStatus::Interrupted

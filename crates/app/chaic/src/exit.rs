@@ -18,10 +18,10 @@ pub const OK: u8 = 0;
 pub const FAILED: u8 = 1;
 /// Invalid request; the parser of the command line exits with the same code.
 pub const USAGE: u8 = 2;
-/// Ended by Ctrl-C: 128 + 2, the number of SIGINT, as in shells.
+/// The command was stopped by Ctrl-C: 128 plus 2, the number of SIGINT, as in shells.
 pub const INTERRUPTED: u8 = 130;
 
-/// End of a command that returned no error.
+/// Exit status of a command that returned no error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExitStatus {
     /// The command succeeded.
@@ -85,7 +85,8 @@ pub fn code_of(error: &anyhow::Error) -> u8 {
     if is_usage { USAGE } else { FAILED }
 }
 
-/// Adds a line to an error that says how to continue. An invalid request stays as it is: it would fail again.
+/// Adds a line to an error that describes how to continue. Errors of invalid requests are not changed,
+/// because a repetition would fail again.
 pub fn with_hint(error: anyhow::Error, hint: &str) -> anyhow::Error {
     if code_of(&error) == USAGE { error } else { anyhow!("{error:#}\n{hint}") }
 }

@@ -1,7 +1,8 @@
-//! The command `chaic`. It parses options, calls the other crates and prints results, without logic of its own.
+//! The command `chaic`. It parses options, calls the other crates and prints results. It contains no other
+//! logic.
 //!
-//! **What it is not**: an interface for programs. Those use the crates below it. This library exists for other
-//! programs that ship the same command, such as chaic's Python package.
+//! **What it is not**: an interface for programs. Programs use the crates of the lower layers. This library
+//! exists for other programs that ship the same command, such as chaic's Python package.
 
 // All output goes through `output`, which escapes control characters.
 #![deny(clippy::print_stdout, clippy::print_stderr)]

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use chaic_sandbox::{Launcher, run_stage};
 
 fn main() -> ExitCode {
-    // Sandboxes of helper processes start this program again.
+    // A sandbox of a helper process starts this program again, for one stage of the sandbox.
     if let Some(status) = run_stage(std::env::args_os()) {
         return ExitCode::from(status);
     }

@@ -76,7 +76,7 @@ pub fn print(text: &str) -> Result<()> {
     print_while_read(text).map(|_| ())
 }
 
-/// Like [`print`]; returns whether the reader is still there, so that long output can stop early.
+/// Like [`print`]; returns whether the reader still reads, so that long output can stop early.
 ///
 /// # Errors
 /// Those of [`print`].
@@ -125,7 +125,7 @@ pub fn print_warning(text: &str) {
 ///
 /// `error:` and `warning:` at the start are colored if standard error is.
 pub fn print_error(line: &str) {
-    /// Starts of lines with their ANSI colors: bold red and bold yellow.
+    /// Labels at the start of lines, with their ANSI codes for bold red and bold yellow.
     const LABELS: [(&str, &str); 2] = [("error:", "\u{1b}[1;31m"), ("warning:", "\u{1b}[1;33m")];
     let line = printable(line);
     let mut err = io::stderr().lock();
@@ -142,7 +142,7 @@ pub fn print_error(line: &str) {
 /// Returns a text without control characters, except for line ends and tabs, and without characters that change
 /// the direction of writing.
 ///
-/// They are escaped as in JSON, for example `\u001b`, so that JSON keeps its meaning.
+/// Such characters are escaped as in JSON, for example `\u001b`, so that JSON output stays valid.
 pub fn printable(text: &str) -> Cow<'_, str> {
     if !text.contains(is_control) {
         return Cow::Borrowed(text);

@@ -5,12 +5,12 @@ use chaic_env::rules::rule_names;
 
 use crate::exit::env_error;
 
-/// Largest number of typing errors between a name and a suggestion: characters that were added, left out,
-/// replaced, or swapped with their neighbor.
+/// Maximum edit distance (Damerau-Levenshtein) between a name and a suggestion: characters added, left
+/// out, replaced, or swapped with a neighbor.
 const MAX_ERRORS: usize = 2;
 
-/// Returns the known name with the fewest typing errors: at most [`MAX_ERRORS`], and at most half as many as the
-/// given name has characters.
+/// Returns the most similar known name. The edit distance is at most [`MAX_ERRORS`], and at most half the length
+/// of the given name.
 pub fn similar_name<S: AsRef<str>>(
     name: &str,
     known: impl IntoIterator<Item = S>,

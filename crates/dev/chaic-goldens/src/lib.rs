@@ -24,8 +24,8 @@ use crate::script::Script;
 
 /// The committed table.
 pub const GOLDENS: &str = include_str!("../goldens.txt");
-/// Frames at which states are compared: early ones locate the begin of a difference (moving house
-/// ends before the last).
+/// Frames at which states are compared: early frames locate the start of a difference. Moving house
+/// ends before the last frame.
 const FRAMES: [u32; 3] = [100, 300, 2900];
 /// Side of images, pixels; odd, so that rows end within a block of the widest vectors.
 const SIDE_PX: u32 = 203;

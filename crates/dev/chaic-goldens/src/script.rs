@@ -15,7 +15,7 @@ const NEAREST: usize = 3;
 const REACH_M: f32 = 1.8;
 /// Duration for which an agent keeps its target, frames.
 const TARGET_FRAMES: u32 = 300;
-/// Duration for which both agents go for the same piece of furniture, frames.
+/// Duration for which both agents have the same piece of furniture as target, frames.
 const TOGETHER_FRAMES: u32 = 500;
 
 /// Script with the state of all actors and event counts.
@@ -29,7 +29,7 @@ pub struct Script {
 #[derive(Debug)]
 struct Actor {
     rng: RngStream,
-    /// Object that the agent goes for, with the last frame of the attempt.
+    /// Target of the agent, with the last frame of the attempt.
     target: Option<(EntityId, u32)>,
 }
 

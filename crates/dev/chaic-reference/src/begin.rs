@@ -6,7 +6,7 @@ use chaic_core::geom::wrap_angle;
 use chaic_core::{AgentId, EntityId, ResolvedAction};
 use chaic_world::EventKind;
 
-use crate::state::{Doing, Location, Part};
+use crate::state::{Location, OngoingAction, Part};
 use crate::turn::Turn;
 use crate::verdict::Verdict;
 
@@ -31,9 +31,9 @@ impl Turn<'_> {
         if action != Action::MoveForward {
             self.person_mut(agent).in_stride = false;
         }
-        self.happens(EventKind::Began { agent, action });
+        self.emit(EventKind::Began { agent, action });
         let since = self.state.frame;
-        self.person_mut(agent).doing = Some(Doing { action, since, failing, parts });
+        self.person_mut(agent).ongoing = Some(OngoingAction { action, since, failing, parts });
         if !self.is_paper() && failing.is_none() {
             self.call_other_to_lift(agent, action);
         }
@@ -175,18 +175,19 @@ impl Turn<'_> {
         let is_same = |a: ResolvedAction| matches!(a, Action::PickUp { object: other, .. } if other == object);
         let called = self.agents().filter(|a| *a != agent).find(|a| {
             let person = self.person(*a);
-            let current = person.doing.as_ref().map(|d| d.action);
+            let current = person.ongoing.as_ref().map(|d| d.action);
             current.or(person.last.map(|(action, _)| action)).is_some_and(is_same)
         });
         let Some(other) = called else { return };
         let Ok(parts) = self.plan(other, action) else { return };
         let since = self.state.frame;
-        self.person_mut(other).doing = Some(Doing { action, since, failing: None, parts });
-        self.happens(EventKind::Began { agent: other, action });
+        self.person_mut(other).ongoing =
+            Some(OngoingAction { action, since, failing: None, parts });
+        self.emit(EventKind::Began { agent: other, action });
         let return_arms = Part::Arms(self.facts.numbers.return_arms);
         for who in [agent, other] {
-            if let Some(doing) = &mut self.person_mut(who).doing {
-                doing.parts.insert(0, return_arms);
+            if let Some(ongoing) = &mut self.person_mut(who).ongoing {
+                ongoing.parts.insert(0, return_arms);
             }
         }
     }

@@ -6,17 +6,17 @@ use chaic_core::{AgentId, ResolvedAction};
 use chaic_world::{Event, EventKind, Phase, Setup, World};
 
 use crate::numbers::RuleSet;
-use crate::scene::{Given, Scene};
+use crate::scene::{GivenQuantities, Scene};
 use crate::state::{Location, Part, RefState};
 use crate::turn::{Facts, Turn};
 use crate::verdict::Choices;
 
-/// Largest number of states that the open conditions of an episode may leave possible.
+/// Maximum number of states that remain possible because of open conditions.
 const MAX_STATES: usize = 64;
-/// Largest difference of the fatigue of a person, which sums up rounding.
+/// Maximum difference of the fatigue of a person; rounding errors accumulate in it.
 const FATIGUE_TOLERANCE: f32 = 1e-4;
 
-/// The reference beside a world.
+/// States of the reference that are compared with a world.
 pub(crate) struct Comparison<'a> {
     facts: Facts<'a>,
     /// States that agree with the world so far; usually one.
@@ -43,7 +43,7 @@ impl<'a> Comparison<'a> {
     pub(crate) fn frame(
         &mut self,
         submitted: &[(AgentId, ResolvedAction)],
-        given: &Given,
+        given: &GivenQuantities,
         world: &World,
         events: &[Event],
     ) -> Result<(), String> {
@@ -87,7 +87,7 @@ impl<'a> Comparison<'a> {
     pub(crate) fn describe(&self) -> String {
         let mut text = String::new();
         for (k, person) in self.states.iter().flat_map(|s| s.people.iter().enumerate()) {
-            let _ = writeln!(text, "person {k}: hands {:?}, {:?}", person.hands, person.doing);
+            let _ = writeln!(text, "person {k}: hands {:?}, {:?}", person.hands, person.ongoing);
         }
         text
     }
@@ -135,7 +135,8 @@ impl Differences {
     }
 }
 
-/// Objects lose their support in no particular order.
+/// Returns the events with consecutive losses of support sorted by object, because their order is
+/// unspecified.
 fn sorted(events: &[Event]) -> Vec<Event> {
     let mut events = events.to_vec();
     for group in events.chunk_by_mut(|a, b| {
@@ -152,7 +153,7 @@ fn sorted(events: &[Event]) -> Vec<Event> {
 
 fn find_differences(turn: &Turn<'_>, world: &World, events: &[Event]) -> Vec<String> {
     let (own, state) = (&turn.state, world.state());
-    let mut d = Differences(own.complaints.clone());
+    let mut d = Differences(own.impossible_motions.clone());
     let name = |text: &'static str| move || text.to_owned();
     d.check(name("frame"), own.frame, state.frame);
     d.check(name("over"), own.over, state.over);
@@ -188,12 +189,12 @@ fn find_differences(turn: &Turn<'_>, world: &World, events: &[Event]) -> Vec<Str
             let is_equal = (person.fatigue - condition.fatigue).abs() < FATIGUE_TOLERANCE;
             d.check(of("equal fatigue"), is_equal, true);
         }
-        let doing = person.doing.as_ref();
-        let doing = doing.map(|d| (d.action, d.since, d.failing, motion_of_part(d.parts[0])));
+        let ongoing = person.ongoing.as_ref();
+        let ongoing = ongoing.map(|d| (d.action, d.since, d.failing, motion_of_part(d.parts[0])));
         let activity = agent.activity.as_ref();
         let activity =
             activity.map(|a| (a.action, a.since, a.failing, motion_of_phase(a.step.phase)));
-        d.check(of("action"), doing, activity);
+        d.check(of("action"), ongoing, activity);
     }
     for (k, (thing, object)) in own.things.iter().zip(&state.objects).enumerate() {
         let of = |text: &'static str| {

@@ -13,7 +13,7 @@ use chaic_world::{Setup, Snapshot, World};
 const NEAR_M: f32 = 2.4;
 /// Distance at which a person is put beside an object, from its edge, meters.
 const BESIDE_M: [f32; 2] = [0.25, 1.3];
-/// The same for furniture, so that one person may wait long for the other.
+/// The same distance for furniture. It is larger, so that one person may wait long for the other.
 const BESIDE_FURNITURE_M: [f32; 2] = [0.2, 2.9];
 
 /// Source of random actions in one episode.
@@ -56,7 +56,7 @@ impl Driver {
         Driver { rng: RngStream::new(seed, "reference driver", 0), meeting: None, joint_lift: None }
     }
 
-    /// Moves people who wait for a decision beside objects, at random. Returns whether it did.
+    /// Moves people who wait for a decision to random objects. Returns whether a person was moved.
     pub(crate) fn move_people(&mut self, world: &mut World) -> bool {
         let waiting = world.waiting();
         let chosen: Vec<AgentId> = waiting.into_iter().filter(|_| self.rng.chance(0.12)).collect();
@@ -214,7 +214,7 @@ impl Driver {
         ControlFlow::Continue(())
     }
 
-    /// Chooses a hand; one whose entry is false with this probability.
+    /// Chooses a hand at random. With this probability, prefers a hand whose entry is false.
     fn hand(&mut self, is_avoided: [bool; 2], probability: f32) -> Hand {
         let hand = if self.rng.chance(0.5) { Hand::Left } else { Hand::Right };
         let other = is_avoided[hand.index()] && !is_avoided[hand.other().index()];

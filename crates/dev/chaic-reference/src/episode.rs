@@ -14,7 +14,7 @@ use crate::compare::Comparison;
 use crate::coverage::Coverage;
 use crate::driver::Driver;
 use crate::numbers::RuleSet;
-use crate::scene::{Given, walkers};
+use crate::scene::{GivenQuantities, walkers};
 
 /// A difference between the reference and the world.
 #[derive(Clone, Debug)]
@@ -170,7 +170,7 @@ pub fn play_actions(
 
 /// Source of actions.
 trait Actor {
-    /// Moves people between two frames; returns whether it did.
+    /// Moves people between two frames; returns whether a person was moved.
     fn move_people(&mut self, world: &mut World) -> bool;
     /// Chooses the next action of a person; `None` lets it wait for another frame.
     fn choose(&mut self, world: &World, agent: AgentId) -> Option<ResolvedAction>;
@@ -218,7 +218,7 @@ fn compare(
         }
         let mut submitted = Vec::new();
         for agent in world.waiting() {
-            // A call to lift furniture may have given it an action.
+            // A call to lift furniture together may have given the person an action.
             let is_waiting = world.state().agents[agent.index()].activity.is_none();
             if let Some(action) = actor.choose(&world, agent).filter(|_| is_waiting) {
                 world.submit(agent, action).expect("the agent waits");
@@ -228,13 +228,13 @@ fn compare(
         let walked = walkers(&world);
         world.tick();
         let events = world.drain_events();
-        let given = Given::of(&world, &walked);
+        let given = GivenQuantities::of(&world, &walked);
         reference.frame(&submitted, &given, &world, &events).map_err(|text| {
-            let doing = reference.describe();
+            let ongoing = reference.describe();
             let people = setup.people.iter().map(|p| p.kind().to_string()).collect::<Vec<_>>();
             let task = setup.task;
             let text =
-                format!("{text}\n{task} {set:?}, {people:?}\nsubmitted {submitted:?}\n{doing}");
+                format!("{text}\n{task} {set:?}, {people:?}\nsubmitted {submitted:?}\n{ongoing}");
             (world.state().frame, text)
         })?;
         coverage.count(&events);

@@ -1,4 +1,4 @@
-//! One frame: every person continues its action, objects fall, counters count.
+//! Simulation of one frame: every person continues its action, objects fall, counters advance.
 
 use chaic_core::action::{Action, FailureReason, Outcome};
 use chaic_core::catalogue::Role;
@@ -8,20 +8,20 @@ use chaic_world::EventKind;
 
 use crate::numbers::{DROP, PROGRESS_M, REST_FRAMES, STUCK_FRAMES, WORK_FRAMES};
 use crate::scene::{Geometry, distance_m};
-use crate::state::{Carry, Doing, Location, Part};
+use crate::state::{Carry, Location, OngoingAction, Part};
 use crate::turn::Turn;
 use crate::verdict::Verdict;
 
-/// Status of a part after a frame.
-pub(crate) enum Step {
-    /// The part goes on.
-    Goes,
+/// Status of a part of an action after a frame.
+pub(crate) enum PartStatus {
+    /// The part continues in the next frame.
+    Continues,
     /// The part ended with this frame.
-    Ends,
-    /// The part took no time.
-    Skips,
-    /// The action ends now.
-    Fails(FailureReason),
+    Ended,
+    /// The part took no time; the next part starts in the same frame.
+    TakesNoTime,
+    /// The action failed in this frame.
+    Failed(FailureReason),
 }
 
 /// Returns whether an action is neither a step, a turn nor a wait.
@@ -32,10 +32,10 @@ fn is_interaction(action: ResolvedAction) -> bool {
     )
 }
 
-/// Counts down; returns whether the part has ended.
-fn count_down(left: &mut u32) -> Step {
+/// Counts down the remaining frames; returns [`PartStatus::Ended`] at 0.
+fn count_down(left: &mut u32) -> PartStatus {
     *left = left.saturating_sub(1);
-    if *left == 0 { Step::Ends } else { Step::Goes }
+    if *left == 0 { PartStatus::Ended } else { PartStatus::Continues }
 }
 
 impl Turn<'_> {
@@ -61,13 +61,13 @@ impl Turn<'_> {
         let is_complete = self.is_complete();
         if is_complete || self.state.frame >= self.facts.setup.horizon {
             self.state.over = true;
-            self.happens(EventKind::Over { complete: is_complete });
+            self.emit(EventKind::Over { complete: is_complete });
         }
     }
 
     /// Returns whether walking, handling or following tires the person in this frame.
     fn works(&self, agent: AgentId) -> bool {
-        let current = |a: AgentId| self.person(a).doing.as_ref().map(|d| d.parts[0]);
+        let current = |a: AgentId| self.person(a).ongoing.as_ref().map(|d| d.parts[0]);
         let walks = |part| matches!(part, Some(Part::Walk { .. } | Part::Approach { .. }));
         let is_led = self
             .state
@@ -87,49 +87,49 @@ impl Turn<'_> {
         if !Geometry::has_moved(&self.state.scene, &self.given.after, agent) {
             return;
         }
-        let part = self.person(agent).doing.as_ref().map(|d| d.parts[0]);
+        let part = self.person(agent).ongoing.as_ref().map(|d| d.parts[0]);
         let walks = matches!(part, Some(Part::Walk { .. } | Part::Approach { .. }));
         let carries = self.state.carry.is_some_and(|c| c.leader == agent || c.follower == agent);
         if !walks && !carries {
-            self.state.complaints.push(format!("the {agent} moved during {part:?}"));
+            self.state.impossible_motions.push(format!("the {agent} moved during {part:?}"));
         }
     }
 
     fn continue_action(&mut self, agent: AgentId) {
-        let Some(mut doing) = self.person_mut(agent).doing.take() else { return };
+        let Some(mut ongoing) = self.person_mut(agent).ongoing.take() else { return };
         loop {
-            match self.run_part(agent, &mut doing) {
-                Step::Goes => {
+            match self.run_part(agent, &mut ongoing) {
+                PartStatus::Continues => {
                     // Furniture lifted by two replaces the action of both.
-                    self.person_mut(agent).doing.get_or_insert(doing);
+                    self.person_mut(agent).ongoing.get_or_insert(ongoing);
                     return;
                 }
-                Step::Skips => {
-                    doing.parts.remove(0);
-                    if doing.parts.is_empty() {
-                        return self.end(agent, &doing);
+                PartStatus::TakesNoTime => {
+                    ongoing.parts.remove(0);
+                    if ongoing.parts.is_empty() {
+                        return self.end(agent, &ongoing);
                     }
                 }
-                Step::Ends => {
-                    doing.parts.remove(0);
-                    if doing.parts.is_empty() {
-                        self.end(agent, &doing);
+                PartStatus::Ended => {
+                    ongoing.parts.remove(0);
+                    if ongoing.parts.is_empty() {
+                        self.end(agent, &ongoing);
                     } else {
-                        self.person_mut(agent).doing = Some(doing);
+                        self.person_mut(agent).ongoing = Some(ongoing);
                     }
                     return;
                 }
-                Step::Fails(reason) => {
-                    doing.failing = Some(reason);
-                    return self.end(agent, &doing);
+                PartStatus::Failed(reason) => {
+                    ongoing.failing = Some(reason);
+                    return self.end(agent, &ongoing);
                 }
             }
         }
     }
 
-    fn end(&mut self, agent: AgentId, doing: &Doing) {
-        let outcome = doing.failing.map_or(Outcome::Success, Outcome::Failure);
-        let (action, frame) = (doing.action, self.state.frame + 1);
+    fn end(&mut self, agent: AgentId, ongoing: &OngoingAction) {
+        let outcome = ongoing.failing.map_or(Outcome::Success, Outcome::Failure);
+        let (action, frame) = (ongoing.action, self.state.frame + 1);
         let position = self.state.scene.people[agent.index()].position;
         let person = self.person_mut(agent);
         let is_put_on = |action| matches!(action, Action::PutOn { .. });
@@ -146,7 +146,7 @@ impl Turn<'_> {
             }
         }
         person.in_stride = action == Action::MoveForward && outcome == Outcome::Success;
-        self.happens(EventKind::Ended { agent, action, outcome });
+        self.emit(EventKind::Ended { agent, action, outcome });
         let delivers_all = outcome == Outcome::Success || follows_put_on;
         if !self.is_paper() && is_put_on(action) && delivers_all {
             self.deliver_all_of(agent);
@@ -154,22 +154,22 @@ impl Turn<'_> {
     }
 
     /// Runs one frame of the current part.
-    fn run_part(&mut self, agent: AgentId, doing: &mut Doing) -> Step {
-        let mut part = doing.parts[0];
+    fn run_part(&mut self, agent: AgentId, ongoing: &mut OngoingAction) -> PartStatus {
+        let mut part = ongoing.parts[0];
         let step = match &mut part {
             Part::Stand(left) | Part::Arms(left) => count_down(left),
             Part::Turn { left, yaw_rad } => self.turn(agent, left, *yaw_rad),
             Part::Walk { left_m, covered_m } => self.walk(agent, left_m, covered_m),
             Part::Approach { to, n_stuck } => self.approach_frame(agent, *to, n_stuck),
             Part::AwaitOther { object, waited, n_alone } => {
-                self.await_other(agent, doing, *object, waited, n_alone)
+                self.await_other(agent, ongoing, *object, waited, n_alone)
             }
-            Part::DecideTake { hand, object } => self.decide_take(agent, doing, *hand, *object),
-            Part::DecidePut { hand, place } => self.decide_put(agent, doing, *hand, *place),
+            Part::DecideTake { hand, object } => self.decide_take(agent, ongoing, *hand, *object),
+            Part::DecidePut { hand, place } => self.decide_put(agent, ongoing, *hand, *place),
             Part::Grasp { left, hand, object } => match count_down(left) {
-                Step::Ends => {
-                    self.close_hand(agent, doing, *hand, *object);
-                    Step::Ends
+                PartStatus::Ended => {
+                    self.close_hand(agent, ongoing, *hand, *object);
+                    PartStatus::Ended
                 }
                 other => other,
             },
@@ -182,7 +182,7 @@ impl Turn<'_> {
                         *rest += self.draw_watch(agent);
                     }
                 }
-                if *open == 0 && *rest == 0 { Step::Ends } else { Step::Goes }
+                if *open == 0 && *rest == 0 { PartStatus::Ended } else { PartStatus::Continues }
             }
             Part::Release { open, watch, object, on, sets_down } => {
                 if *open > 0 {
@@ -195,29 +195,31 @@ impl Turn<'_> {
                 }
                 let falls = self.thing(*object).location == Location::Falls;
                 let is_done = *open == 0 && (*watch == 0 || !falls);
-                if is_done { Step::Ends } else { Step::Goes }
+                if is_done { PartStatus::Ended } else { PartStatus::Continues }
             }
-            Part::Follow => Step::Goes,
+            Part::Follow => PartStatus::Continues,
         };
-        if matches!(step, Step::Goes) {
-            doing.parts[0] = part;
+        if matches!(step, PartStatus::Continues) {
+            ongoing.parts[0] = part;
         }
         step
     }
 
-    fn turn(&mut self, agent: AgentId, left: &mut u32, yaw_rad: f32) -> Step {
+    fn turn(&mut self, agent: AgentId, left: &mut u32, yaw_rad: f32) -> PartStatus {
         let yaw = self.given.after.people[agent.index()].yaw_rad;
         if wrap_angle(yaw - yaw_rad).abs() > 1e-4 {
-            // Two people with furniture may lack the room.
+            // Two people who carry furniture may lack the space to turn.
             if self.is_paper() && self.follower(agent).is_some() {
-                return Step::Fails(FailureReason::Blocked);
+                return PartStatus::Failed(FailureReason::Blocked);
             }
-            self.state.complaints.push(format!("the {agent} turned to {yaw}, not {yaw_rad}"));
+            self.state
+                .impossible_motions
+                .push(format!("the {agent} turned to {yaw}, not {yaw_rad}"));
         }
         count_down(left)
     }
 
-    fn walk(&mut self, agent: AgentId, left_m: &mut f64, covered_m: &mut f64) -> Step {
+    fn walk(&mut self, agent: AgentId, left_m: &mut f64, covered_m: &mut f64) -> PartStatus {
         let n = self.facts.numbers;
         let speed_m = self.limits(agent).speed_m * self.strength(agent);
         let pose = self.state.scene.people[agent.index()];
@@ -228,28 +230,36 @@ impl Turn<'_> {
         if !self.is_paper() {
             let is_done = Verdict::at_most(*left_m, 0.0);
             let is_done = is_done.or(Verdict::sure(self.given.stopped[agent.index()]));
-            return if self.choices.decide(is_done) { Step::Ends } else { Step::Goes };
+            return if self.choices.decide(is_done) {
+                PartStatus::Ended
+            } else {
+                PartStatus::Continues
+            };
         }
         let ends = Verdict::at_most(*left_m, 0.0).or(Verdict::at_most(moved_m, 0.1 * speed_m));
         if !self.choices.decide(ends) {
-            return Step::Goes;
+            return PartStatus::Continues;
         }
         let is_far = Verdict::at_most(n.min_progress_m, *covered_m);
-        if self.choices.decide(is_far) { Step::Ends } else { Step::Fails(FailureReason::Blocked) }
+        if self.choices.decide(is_far) {
+            PartStatus::Ended
+        } else {
+            PartStatus::Failed(FailureReason::Blocked)
+        }
     }
 
-    fn approach_frame(&mut self, agent: AgentId, to: EntityId, n_stuck: &mut u32) -> Step {
-        /// Frames without approaching after which a person stops.
+    fn approach_frame(&mut self, agent: AgentId, to: EntityId, n_stuck: &mut u32) -> PartStatus {
+        /// Number of frames without getting closer after which a person stops.
         const PATIENCE: u32 = 4;
         let n = self.facts.numbers;
         let [own, next] = [&self.state.scene, &self.given.after]
             .map(|scene| scene.people[agent.index()].position);
         let before_m = self.reach_m(agent, own, to);
         if self.choices.decide(Verdict::at_most(before_m, n.arm_m)) {
-            return Step::Ends;
+            return PartStatus::Ended;
         }
         if !self.is_paper() && self.given.stopped[agent.index()] {
-            return Step::Ends;
+            return PartStatus::Ended;
         }
         let speed_m = self.limits(agent).approach_speed_m * self.strength(agent);
         let approached_m = before_m - self.reach_m(agent, next, to);
@@ -259,44 +269,44 @@ impl Turn<'_> {
             Verdict::at_most(approached_m, 0.25 * speed_m)
         };
         *n_stuck = if self.choices.decide(is_stuck) { *n_stuck + 1 } else { 0 };
-        if *n_stuck >= PATIENCE { Step::Ends } else { Step::Goes }
+        if *n_stuck >= PATIENCE { PartStatus::Ended } else { PartStatus::Continues }
     }
 
     /// Waits at furniture while another person has chosen to pick it up.
     fn await_other(
         &mut self,
         agent: AgentId,
-        doing: &mut Doing,
+        ongoing: &mut OngoingAction,
         object: EntityId,
         waited: &mut u32,
         n_alone: &mut u32,
-    ) -> Step {
-        /// Frames in which the other may decide again.
+    ) -> PartStatus {
+        /// Number of frames in which the other person may decide again.
         const GRACE: u32 = 3;
         *waited += 1;
         let wants_it = |a: &AgentId| {
-            let other = self.person(*a).doing.as_ref();
+            let other = self.person(*a).ongoing.as_ref();
             other.is_some_and(
                 |d| matches!(d.action, Action::PickUp { object: o, .. } if o == object),
             )
         };
         let Some(other) = self.agents().filter(|a| *a != agent).find(wants_it) else {
             *n_alone += 1;
-            return if *n_alone >= GRACE { Step::Ends } else { Step::Goes };
+            return if *n_alone >= GRACE { PartStatus::Ended } else { PartStatus::Continues };
         };
         *n_alone = 0;
         let own_reach = self.is_within_reach(agent, object);
         if !self.choices.decide(own_reach) {
-            return Step::Fails(FailureReason::Blocked);
+            return PartStatus::Failed(FailureReason::Blocked);
         }
-        let part = self.person(other).doing.as_ref().map(|d| d.parts[0]);
+        let part = self.person(other).ongoing.as_ref().map(|d| d.parts[0]);
         let is_there = match part {
             Some(Part::AwaitOther { .. }) => self.is_within_reach(other, object),
             _ => Verdict::No,
         };
         if !self.choices.decide(is_there) {
             let is_late = *waited >= self.facts.numbers.await_other;
-            return if is_late { Step::Ends } else { Step::Goes };
+            return if is_late { PartStatus::Ended } else { PartStatus::Continues };
         }
         let (leader, follower) = (agent.min(other), agent.max(other));
         self.state.carry = Some(Carry { object, leader, follower, has_begun: false });
@@ -310,20 +320,20 @@ impl Turn<'_> {
         follow.push(Part::Follow);
         let (own_parts, other_parts) =
             if agent == leader { (lead, follow) } else { (follow, lead) };
-        doing.parts.truncate(1);
-        doing.parts.extend(own_parts);
-        if let Some(doing) = &mut self.person_mut(other).doing {
-            doing.parts = other_parts;
+        ongoing.parts.truncate(1);
+        ongoing.parts.extend(own_parts);
+        if let Some(ongoing) = &mut self.person_mut(other).ongoing {
+            ongoing.parts = other_parts;
         }
-        Step::Skips
+        PartStatus::TakesNoTime
     }
 
-    /// Drops objects from trembling hands, except during an interaction.
+    /// Lets trembling hands drop objects at random, except during an interaction.
     fn tremble(&mut self, agent: AgentId) {
         if !self.limits(agent).trembles {
             return;
         }
-        if self.person(agent).doing.as_ref().is_some_and(|d| is_interaction(d.action)) {
+        if self.person(agent).ongoing.as_ref().is_some_and(|d| is_interaction(d.action)) {
             return;
         }
         for hand in 0..2 {
@@ -339,7 +349,7 @@ impl Turn<'_> {
         }
     }
 
-    /// Lets falling objects come to rest where the world says.
+    /// Lets falling objects come to rest where they rest in the world.
     fn land(&mut self) {
         for entity in self.facts.setup.entities() {
             let k = self.facts.setup.thing_index(entity).expect("it exists");
@@ -361,7 +371,7 @@ impl Turn<'_> {
         self.state.child_away_frames += u32::from(away);
         if away != self.state.child_is_away {
             self.state.child_is_away = away;
-            self.happens(EventKind::ChildAway { away });
+            self.emit(EventKind::ChildAway { away });
         }
     }
 
@@ -380,7 +390,7 @@ impl Turn<'_> {
             is_any_stuck |= stuck;
             if stuck != self.person(agent).is_stuck {
                 self.person_mut(agent).is_stuck = stuck;
-                self.happens(EventKind::Stuck { agent, stuck });
+                self.emit(EventKind::Stuck { agent, stuck });
             }
         }
         self.state.stuck_frames += u32::from(is_any_stuck);

@@ -74,7 +74,7 @@ impl Turn<'_> {
             let thing = self.thing_mut(entity);
             thing.delivered = Some(frame);
             thing.delivered_by = Some(by);
-            self.happens(EventKind::Delivered { object: entity, by, counted });
+            self.emit(EventKind::Delivered { object: entity, by, counted });
         }
     }
 

@@ -6,9 +6,9 @@ use chaic_core::rng::RngStream;
 use chaic_core::{AgentId, EntityId};
 use chaic_world::EventKind;
 
-use crate::frame::Step;
+use crate::frame::PartStatus;
 use crate::numbers::SLIP;
-use crate::state::{Doing, Location, Part};
+use crate::state::{Location, OngoingAction, Part};
 use crate::turn::{Turn, outside_m, probability};
 use crate::verdict::Verdict;
 
@@ -17,17 +17,17 @@ impl Turn<'_> {
     pub(crate) fn decide_take(
         &mut self,
         agent: AgentId,
-        doing: &mut Doing,
+        ongoing: &mut OngoingAction,
         hand: Option<Hand>,
         object: EntityId,
-    ) -> Step {
+    ) -> PartStatus {
         let n = self.facts.numbers;
         let is_within_reach = self.is_within_reach(agent, object);
         if !self.choices.decide(is_within_reach) {
-            return Step::Fails(FailureReason::Blocked);
+            return PartStatus::Failed(FailureReason::Blocked);
         }
         if let Some(reason) = self.refusal(agent, object, hand.unwrap_or(Hand::Right)) {
-            return Step::Fails(reason);
+            return PartStatus::Failed(reason);
         }
         let limits = self.limits(agent);
         let top_m = self.geometry().top_m(&self.state.scene, object);
@@ -40,10 +40,10 @@ impl Turn<'_> {
             let count = self.person(agent).n_break;
             self.person_mut(agent).n_break += 1;
             if self.draw(agent, "break", count, p) {
-                doing.failing = Some(FailureReason::Broke);
+                ongoing.failing = Some(FailureReason::Broke);
             }
         }
-        if doing.failing.is_none() {
+        if ongoing.failing.is_none() {
             let mass_kg = f64::from(self.spec(object).class.info().mass_kg);
             let height = probability(outside_m(top_m, limits.pick_m), 1.0, 2.0);
             let mass = probability(mass_kg - limits.lift_kg * self.strength(agent), 50.0, 1.0);
@@ -57,47 +57,47 @@ impl Turn<'_> {
                 holds = !self.draw(agent, "slip", count, [SLIP; 2]);
             }
             if !holds {
-                doing.failing = Some(FailureReason::BeyondLimits);
+                ongoing.failing = Some(FailureReason::BeyondLimits);
             }
         }
-        doing.parts.truncate(1);
-        doing.parts.extend([
+        ongoing.parts.truncate(1);
+        ongoing.parts.extend([
             Part::Stand(n.turn),
             Part::Stand(n.gap),
             Part::Arms(n.reach),
             Part::Stand(n.gap),
         ]);
-        if doing.failing == Some(FailureReason::BeyondLimits) {
+        if ongoing.failing == Some(FailureReason::BeyondLimits) {
             if n.grasp_of_nothing > 0 {
-                doing.parts.push(Part::Stand(n.grasp_of_nothing));
+                ongoing.parts.push(Part::Stand(n.grasp_of_nothing));
             }
         } else {
-            doing.parts.push(Part::Grasp { left: n.grasp, hand, object });
+            ongoing.parts.push(Part::Grasp { left: n.grasp, hand, object });
         }
         let is_furniture = hand.is_none();
         let back = if is_furniture { n.raise_furniture } else { n.return_arms };
-        doing.parts.push(Part::Arms(back));
-        Step::Skips
+        ongoing.parts.push(Part::Arms(back));
+        PartStatus::TakesNoTime
     }
 
     /// Closes the hand around an object, which may break. The remaining parts follow.
     pub(crate) fn close_hand(
         &mut self,
         agent: AgentId,
-        doing: &mut Doing,
+        ongoing: &mut OngoingAction,
         hand: Option<Hand>,
         object: EntityId,
     ) {
         let n = self.facts.numbers;
         if let Some(reason) = self.refusal(agent, object, hand.unwrap_or(Hand::Right)) {
-            doing.failing = Some(reason);
+            ongoing.failing = Some(reason);
             self.cancel_carry(agent, reason);
             return;
         }
         self.state.touched.push(object);
-        if doing.failing == Some(FailureReason::Broke) {
+        if ongoing.failing == Some(FailureReason::Broke) {
             self.thing_mut(object).location = Location::Broken;
-            self.happens(EventKind::Broke { agent, object });
+            self.emit(EventKind::Broke { agent, object });
             self.drop_stack(object);
             return;
         }
@@ -110,7 +110,7 @@ impl Turn<'_> {
             Some(Hand::Right) => self.person_mut(agent).hands[1] = Some(object),
             None => self.person_mut(agent).hands = [Some(object), Some(object)],
         }
-        self.happens(EventKind::Taken { agent, object });
+        self.emit(EventKind::Taken { agent, object });
         for inside in self.contents(object) {
             self.thing_mut(inside).last_holder = Some(agent);
         }
@@ -125,11 +125,11 @@ impl Turn<'_> {
                 container: bicycle,
                 is_watched: false,
             };
-            doing.parts.truncate(1);
-            doing.parts.extend([Part::Arms(n.reach), insert, Part::Arms(n.reach)]);
-        } else if matches!(doing.action, Action::RemoveObstacle { .. }) {
-            doing.parts.truncate(1);
-            doing.parts.extend([
+            ongoing.parts.truncate(1);
+            ongoing.parts.extend([Part::Arms(n.reach), insert, Part::Arms(n.reach)]);
+        } else if matches!(ongoing.action, Action::RemoveObstacle { .. }) {
+            ongoing.parts.truncate(1);
+            ongoing.parts.extend([
                 Part::Arms(n.return_arms),
                 Part::Stand(n.turn),
                 Part::Arms(n.reach),
@@ -145,7 +145,7 @@ impl Turn<'_> {
         {
             carry.has_begun = true;
             let (leader, follower) = (carry.leader, carry.follower);
-            self.happens(EventKind::LiftedTogether { leader, follower, object });
+            self.emit(EventKind::LiftedTogether { leader, follower, object });
         }
     }
 
@@ -161,7 +161,7 @@ impl Turn<'_> {
             {
                 self.thing_mut(entity).location = Location::Falls;
                 self.state.touched.push(entity);
-                self.happens(EventKind::LostSupport { object: entity });
+                self.emit(EventKind::LostSupport { object: entity });
                 self.drop_stack(entity);
             }
         }
@@ -171,34 +171,34 @@ impl Turn<'_> {
     pub(crate) fn decide_put(
         &mut self,
         agent: AgentId,
-        doing: &mut Doing,
+        ongoing: &mut OngoingAction,
         hand: Option<Hand>,
         place: EntityId,
-    ) -> Step {
+    ) -> PartStatus {
         let n = self.facts.numbers;
         if !matches!(self.thing(place).location, Location::Rests(_)) {
-            return Step::Fails(FailureReason::Impossible);
+            return PartStatus::Failed(FailureReason::Impossible);
         }
         if self.is_paper() {
             let is_within_reach = self.is_within_reach(agent, place);
             if !self.choices.decide(is_within_reach) {
-                return Step::Fails(FailureReason::Blocked);
+                return PartStatus::Failed(FailureReason::Blocked);
             }
         }
         let objects = self.objects_to_put(agent, hand.unwrap_or(Hand::Right));
         if objects.is_empty() {
-            return Step::Fails(FailureReason::HandEmpty);
+            return PartStatus::Failed(FailureReason::HandEmpty);
         }
-        doing.parts.truncate(1);
-        doing.parts.push(Part::Stand(n.turn));
+        ongoing.parts.truncate(1);
+        ongoing.parts.push(Part::Stand(n.turn));
         if let Some(object) = self.furniture(agent) {
             let (open, on) = (n.open_hand, Some(place));
-            doing.parts.extend([
+            ongoing.parts.extend([
                 Part::Arms(n.reach),
                 Part::Release { open, watch: 0, object, on, sets_down: true },
                 Part::Arms(n.return_arms),
             ]);
-            return Step::Skips;
+            return PartStatus::TakesNoTime;
         }
         let height_m = self.geometry().top_m(&self.state.scene, place);
         let p = probability(outside_m(height_m, self.limits(agent).put_m), 1.0, 1.0);
@@ -215,21 +215,21 @@ impl Turn<'_> {
         };
         let from_basket = [Part::Arms(n.reach), Part::Stand(n.grasp + n.gap)];
         if !succeeds {
-            doing.failing = Some(FailureReason::BeyondLimits);
+            ongoing.failing = Some(FailureReason::BeyondLimits);
         }
         if succeeds && is_rider {
             for object in objects {
-                doing.parts.extend(from_basket);
-                doing.parts.extend([Part::Arms(n.reach), drop(object, Some(place), 0)]);
+                ongoing.parts.extend(from_basket);
+                ongoing.parts.extend([Part::Arms(n.reach), drop(object, Some(place), 0)]);
             }
-            doing.parts.push(Part::Arms(n.reach));
-            return Step::Skips;
+            ongoing.parts.push(Part::Arms(n.reach));
+            return PartStatus::TakesNoTime;
         }
         if is_rider {
-            doing.parts.extend(from_basket);
+            ongoing.parts.extend(from_basket);
         }
         let on = if succeeds { Some(place) } else { None };
-        doing.parts.extend([
+        ongoing.parts.extend([
             Part::Stand(n.gap),
             Part::Arms(n.reach),
             Part::Stand(n.gap),
@@ -239,7 +239,7 @@ impl Turn<'_> {
             Part::Stand(n.gap),
             Part::Arms(if is_rider { n.reach } else { n.return_arms }),
         ]);
-        Step::Skips
+        PartStatus::TakesNoTime
     }
 
     /// Draws how long a person watches an object that was put into a container.
@@ -264,7 +264,7 @@ impl Turn<'_> {
         }
         self.empty_hands_of(agent, object);
         self.thing_mut(object).location = Location::Inside(container, slot);
-        self.happens(EventKind::Stowed { agent, object, container });
+        self.emit(EventKind::Stowed { agent, object, container });
     }
 
     fn empty_hands_of(&mut self, agent: AgentId, object: EntityId) {
@@ -285,7 +285,7 @@ impl Turn<'_> {
     ) {
         self.empty_hands_of(agent, object);
         self.state.touched.push(object);
-        self.happens(EventKind::Released { agent, object, on });
+        self.emit(EventKind::Released { agent, object, on });
         let goal = on.filter(|place| self.facts.setup.goal_places.contains(place));
         // Someone may have taken the place meanwhile.
         let is_there =
@@ -298,7 +298,7 @@ impl Turn<'_> {
         if stands {
             self.deliver_if_at_goal(object);
             if on.is_none() {
-                self.happens(EventKind::ObstacleRemoved { agent, object });
+                self.emit(EventKind::ObstacleRemoved { agent, object });
             }
         }
         if let Some(carry) = self.state.carry
@@ -307,8 +307,8 @@ impl Turn<'_> {
             // The pick-up of the follower succeeds after a pause.
             self.state.carry = None;
             let gap = self.facts.numbers.gap;
-            if let Some(doing) = &mut self.person_mut(carry.follower).doing {
-                doing.parts = vec![Part::Stand(gap)];
+            if let Some(ongoing) = &mut self.person_mut(carry.follower).ongoing {
+                ongoing.parts = vec![Part::Stand(gap)];
             }
         }
     }
@@ -317,9 +317,9 @@ impl Turn<'_> {
     fn cancel_carry(&mut self, leader: AgentId, reason: FailureReason) {
         let Some(carry) = self.state.carry.filter(|c| c.leader == leader) else { return };
         self.state.carry = None;
-        if let Some(doing) = &mut self.person_mut(carry.follower).doing {
-            doing.failing = Some(reason);
-            doing.parts = vec![Part::Stand(1)];
+        if let Some(ongoing) = &mut self.person_mut(carry.follower).ongoing {
+            ongoing.failing = Some(reason);
+            ongoing.parts = vec![Part::Stand(1)];
         }
     }
 }

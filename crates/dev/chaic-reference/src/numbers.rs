@@ -102,9 +102,9 @@ pub(crate) struct Limits {
     pub(crate) trembles: bool,
 }
 
-/// Frames of work from rested to exhausted.
+/// Work from rested to exhausted, frames.
 pub(crate) const WORK_FRAMES: f32 = 400.0;
-/// Frames of rest from exhausted to rested.
+/// Rest from exhausted to rested, frames.
 pub(crate) const REST_FRAMES: f32 = 200.0;
 /// Share of speed and strength of an exhausted person.
 pub(crate) const EXHAUSTED: f64 = 0.4;
@@ -112,9 +112,9 @@ pub(crate) const EXHAUSTED: f64 = 0.4;
 pub(crate) const SLIP: f64 = 0.35;
 /// Probability that a trembling hand drops its object in a frame.
 pub(crate) const DROP: f64 = 0.001;
-/// Frames without progress after which a person is stuck.
+/// Time without progress after which a person is stuck, frames.
 pub(crate) const STUCK_FRAMES: u32 = 200;
-/// Distance of a move that is progress, meters.
+/// Minimum distance of a move that counts as progress, meters.
 pub(crate) const PROGRESS_M: f64 = 0.5;
 
 impl Limits {

@@ -17,7 +17,7 @@ pub(crate) struct Scene {
 
 /// Quantities of one frame that the reference takes as given.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Given {
+pub(crate) struct GivenQuantities {
     /// Poses after the frame.
     pub(crate) after: Scene,
     /// Support of each object that is at rest after the frame; the outer option is `None` for
@@ -39,21 +39,21 @@ impl Scene {
     }
 }
 
-/// Returns who walks or approaches an object.
+/// Returns, for each person, whether it walks or approaches an object.
 pub(crate) fn walkers(world: &World) -> Vec<bool> {
     let walks = |p: Phase| matches!(p, Phase::Walk { .. } | Phase::Approach { .. });
     world.state().agents.iter().map(|a| a.phase().is_some_and(|s| walks(s.phase))).collect()
 }
 
-impl Given {
+impl GivenQuantities {
     /// Reads what happened in a frame; `walked` names the people who walked before it.
-    pub(crate) fn of(world: &World, walked: &[bool]) -> Given {
+    pub(crate) fn of(world: &World, walked: &[bool]) -> GivenQuantities {
         let support = |location: &ObjectLocation| match location {
             ObjectLocation::Resting { on } => Some(*on),
             _ => None,
         };
         let walks = walkers(world);
-        Given {
+        GivenQuantities {
             after: Scene::of(world),
             rests_on: world.state().objects.iter().map(|o| support(&o.location)).collect(),
             stopped: walked.iter().zip(walks).map(|(before, after)| *before && !after).collect(),

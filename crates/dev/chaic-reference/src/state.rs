@@ -76,10 +76,10 @@ pub(crate) enum Part {
 
 /// An action in progress.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Doing {
+pub(crate) struct OngoingAction {
     pub(crate) action: ResolvedAction,
     pub(crate) since: Frame,
-    /// Failure with which the action will end.
+    /// Failure reason with which the action will end.
     pub(crate) failing: Option<FailureReason>,
     /// Remaining parts, the current one first.
     pub(crate) parts: Vec<Part>,
@@ -89,7 +89,7 @@ pub(crate) struct Doing {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Person {
     pub(crate) hands: [Option<EntityId>; 2],
-    pub(crate) doing: Option<Doing>,
+    pub(crate) ongoing: Option<OngoingAction>,
     pub(crate) last: Option<(ResolvedAction, Outcome)>,
     pub(crate) last_interaction: Option<(Frame, ResolvedAction, Outcome)>,
     pub(crate) in_stride: bool,
@@ -133,8 +133,8 @@ pub(crate) struct RefState {
     /// Objects that a person took or released in this frame. Their positions are not known before
     /// its end.
     pub(crate) touched: Vec<EntityId>,
-    /// Impossible motions of the world.
-    pub(crate) complaints: Vec<String>,
+    /// Descriptions of impossible motions of people in the world.
+    pub(crate) impossible_motions: Vec<String>,
 }
 
 impl RefState {
@@ -149,7 +149,7 @@ impl RefState {
         };
         let person = |a: &chaic_world::AgentState| Person {
             hands: a.hands,
-            doing: None,
+            ongoing: None,
             last: None,
             last_interaction: None,
             in_stride: false,
@@ -176,7 +176,7 @@ impl RefState {
             scene: Scene::of(world),
             events: Vec::new(),
             touched: Vec::new(),
-            complaints: Vec::new(),
+            impossible_motions: Vec::new(),
         }
     }
 }

@@ -8,11 +8,11 @@ use chaic_core::{AgentId, EntityId, Vec3};
 use chaic_world::{Event, EventKind, ObjectSpec, Setup};
 
 use crate::numbers::{EXHAUSTED, Limits, Numbers, RuleSet};
-use crate::scene::{Geometry, Given, distance_m};
+use crate::scene::{Geometry, GivenQuantities, distance_m};
 use crate::state::{Location, Person, RefState, Thing};
 use crate::verdict::{Choices, TOLERANCE, Verdict};
 
-/// Everything about an episode that never changes.
+/// Data of an episode that never change.
 pub(crate) struct Facts<'a> {
     pub(crate) setup: &'a Setup,
     pub(crate) set: RuleSet,
@@ -28,15 +28,15 @@ impl<'a> Facts<'a> {
     }
 }
 
-/// The state during a frame.
+/// State and inputs of the reference during one frame.
 pub(crate) struct Turn<'a> {
     pub(crate) facts: &'a Facts<'a>,
     pub(crate) state: RefState,
-    pub(crate) given: &'a Given,
+    pub(crate) given: &'a GivenQuantities,
     pub(crate) choices: &'a mut Choices,
 }
 
-/// Probability that the two roundings of a limit allow: the smallest and the largest.
+/// Smallest and largest probability that are consistent with the rounding of a limit.
 pub(crate) type Probability = [f64; 2];
 
 /// Returns exp(-excess / alpha) / beta, and 1 within the limit (paper, section 3.1).
@@ -92,7 +92,7 @@ impl Turn<'_> {
         Geometry { setup: self.facts.setup, step_over_m: self.facts.numbers.step_over_m }
     }
 
-    pub(crate) fn happens(&mut self, kind: EventKind) {
+    pub(crate) fn emit(&mut self, kind: EventKind) {
         self.state.events.push(Event { frame: self.state.frame, kind });
     }
 
@@ -100,7 +100,7 @@ impl Turn<'_> {
         self.facts.set == RuleSet::Paper
     }
 
-    /// Returns the share of speed and strength that fatigue leaves.
+    /// Returns the fraction of speed and strength that remains with fatigue.
     pub(crate) fn strength(&self, agent: AgentId) -> f64 {
         let fatigue = f64::from(self.person(agent).fatigue);
         if self.limits(agent).tires { 1.0 - (1.0 - EXHAUSTED) * fatigue } else { 1.0 }
@@ -245,8 +245,8 @@ impl Turn<'_> {
         near.and(geometry.sees(own, geometry.nearest(&self.state.scene, own, entity)))
     }
 
-    /// Returns why a person cannot take an object with a hand. The first reason of this list that
-    /// applies is the one that the person gets.
+    /// Returns the reason why a person cannot take an object with a hand: the first that applies,
+    /// in the order of this function.
     pub(crate) fn refusal(
         &self,
         agent: AgentId,
@@ -273,7 +273,7 @@ impl Turn<'_> {
         if self.holder(entity).is_some_and(|by| by != agent) {
             return Some(FailureReason::HeldByOther);
         }
-        // It is in an own hand, or in the own basket.
+        // The object is in a hand of this person, or in the person's basket.
         let is_in_basket = matches!((thing.location, self.bicycle(agent)),
             (Location::Inside(container, _), Some(bicycle)) if container == bicycle);
         if matches!(thing.location, Location::Held(..)) || is_in_basket {
@@ -282,7 +282,7 @@ impl Turn<'_> {
         if role == Role::Obstacle && !limits.lifts_obstacles {
             return Some(FailureReason::BeyondLimits);
         }
-        // One hand fills no containers and carries no furniture.
+        // A person with one hand can take neither containers nor furniture.
         if !limits.has_left_hand
             && (matches!(role, Role::Container | Role::HeavyTarget) || hand == Hand::Left)
         {

@@ -1,4 +1,4 @@
-//! Conditions on measured numbers, and the choices that the numbers leave open.
+//! Conditions on measured numbers, and choices for conditions that rounding leaves open.
 //!
 //! The world computes with 32-bit numbers, the reference with 64-bit ones. A distance within
 //! [`TOLERANCE`] of a limit decides nothing. The reference then follows both answers, and

@@ -1,4 +1,4 @@
-//! Runs of the command `chaic` in processes of their own, with or without a fault.
+//! Runs the command `chaic` in separate processes, with or without a fault.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -11,17 +11,17 @@ use chaic_files::TEMPORARY_SUFFIX;
 use chaic_files::faults::{self, FaultKind, FaultPlan, Operation};
 use chaic_sandbox::Launcher;
 
-use crate::ended::Ended;
+use crate::command_output::CommandOutput;
 
-/// End of the name of a temporary file with a process id, in lists of operations and in plans. The id
-/// differs in every process.
-const OF_PROCESS: &str = ".PROCESS.tmp";
+/// Suffix of the names of temporary files in lists of operations and in fault plans. It replaces the
+/// process id, which differs in every process.
+const PROCESS_SUFFIX: &str = ".PROCESS.tmp";
 
 /// Returns the command line of this program as `chaic`, in a folder.
 pub fn chaic(folder: &Path, fault: Option<&FaultPlan>, log: Option<&Path>) -> Result<Command> {
     let program = std::env::current_exe().context("can't find this program")?;
     let mut command = Command::new(program);
-    // A crash leaves temporary files, which end with the folder.
+    // A crash leaves temporary files, which are removed with the folder.
     command.current_dir(folder).env("TMPDIR", folder).stdin(Stdio::null()).arg("chaic");
     if let Some(FaultPlan { path, index, kind }) = fault {
         command.args(["--fault", kind.name(), "--at", &index.to_string()]).arg("--path").arg(path);
@@ -37,18 +37,18 @@ pub fn chaic(folder: &Path, fault: Option<&FaultPlan>, log: Option<&Path>) -> Re
 ///
 /// # Errors
 /// If the process cannot be started.
-pub fn run(folder: &Path, arguments: &[&str], fault: Option<&FaultPlan>) -> Result<Ended> {
+pub fn run(folder: &Path, arguments: &[&str], fault: Option<&FaultPlan>) -> Result<CommandOutput> {
     let output = chaic(folder, fault, None)?.args(arguments).output().context("can't start")?;
     let text = |bytes: Vec<u8>| String::from_utf8_lossy(&bytes).into_owned();
     let (stdout, stderr) = (text(output.stdout), text(output.stderr));
-    Ok(Ended { code: output.status.code(), stdout, stderr })
+    Ok(CommandOutput { code: output.status.code(), stdout, stderr })
 }
 
 /// Runs `chaic` in a folder; it must succeed.
 ///
 /// # Errors
 /// If it fails.
-pub fn run_ok(folder: &Path, arguments: &[&str]) -> Result<Ended> {
+pub fn run_ok(folder: &Path, arguments: &[&str]) -> Result<CommandOutput> {
     let ended = run(folder, arguments, None)?;
     if ended.code != Some(0) {
         let code = ended.code;
@@ -62,7 +62,7 @@ pub fn run_ok(folder: &Path, arguments: &[&str]) -> Result<Ended> {
 pub struct FileOperation {
     /// The file or folder that it changes. Process ids are left out.
     pub path: String,
-    /// Number among the operations on this path, from 0.
+    /// Index among the operations on this path, from 0.
     pub index: usize,
     /// Name of its kind.
     pub kind: String,
@@ -94,7 +94,7 @@ pub fn operations(folder: &Path, arguments: &[&str], log: &Path) -> Result<Vec<F
     Ok(found)
 }
 
-/// Plays the command `chaic` in this process, with a fault.
+/// Runs the command `chaic` in this process, with a fault.
 pub fn run_chaic(
     fault: Option<FaultPlan>,
     log: Option<&Path>,
@@ -119,22 +119,23 @@ pub fn run_chaic(
     ExitCode::from(code)
 }
 
-/// Returns the end of the name of a temporary file of this process.
-fn of_this_process() -> String {
+/// Returns the suffix of the names of this process's temporary files.
+fn this_process_suffix() -> String {
     format!(".{}{TEMPORARY_SUFFIX}", std::process::id())
 }
 
-/// Replaces the id of this process at the end of a path by [`OF_PROCESS`].
+/// Replaces the id of this process at the end of a path by [`PROCESS_SUFFIX`].
 fn without_process_id(path: &Path) -> String {
     let text = path.display().to_string();
-    let stem = text.strip_suffix(&of_this_process()).map(|stem| format!("{stem}{OF_PROCESS}"));
+    let stem =
+        text.strip_suffix(&this_process_suffix()).map(|stem| format!("{stem}{PROCESS_SUFFIX}"));
     stem.unwrap_or(text)
 }
 
-/// Replaces [`OF_PROCESS`] at the end of a path by the id of this process.
+/// Replaces [`PROCESS_SUFFIX`] at the end of a path by the id of this process.
 fn with_process_id(path: PathBuf) -> PathBuf {
-    let stem = path.to_str().and_then(|text| text.strip_suffix(OF_PROCESS));
-    stem.map(|stem| PathBuf::from(format!("{stem}{}", of_this_process()))).unwrap_or(path)
+    let stem = path.to_str().and_then(|text| text.strip_suffix(PROCESS_SUFFIX));
+    stem.map(|stem| PathBuf::from(format!("{stem}{}", this_process_suffix()))).unwrap_or(path)
 }
 
 impl FileOperation {

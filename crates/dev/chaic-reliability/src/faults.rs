@@ -1,10 +1,11 @@
 //! Exhaustive injection of file faults: each operation of a command fails in each way.
 //!
 //! For each fault the command runs in a fresh copy of its inputs. Then:
-//! 1. it has no panic, and its failure is one line. If it reports success, its result is complete;
+//! 1. it does not panic, and reports a failure in one line. If it reports success, its result is
+//!    complete;
 //! 2. readers accept no half-written result;
-//! 3. the way back gives the files of an undisturbed command, byte by byte, and no others. Of random
-//!    contents, only the names of the files are compared.
+//! 3. the recovery gives the files of an undisturbed command, byte by byte, and no others. If
+//!    contents are random, only the names of the files are compared.
 
 use std::path::Path;
 use std::sync::Mutex;
@@ -15,8 +16,8 @@ use anyhow::{Context as _, Result};
 use chaic_files::faults::{CRASHED, FaultKind, FaultPlan};
 use clap::Args;
 
+use crate::command_output::CommandOutput;
 use crate::commands::{FileOperation, run};
-use crate::ended::Ended;
 use crate::folder::{copy, differences};
 use crate::scenario::{select, words};
 use crate::trial::Trial;
@@ -116,8 +117,8 @@ fn check(trial: &Trial<'_>, fault: &FaultPlan, at: &Path) -> Result<()> {
     trial.complete(at)
 }
 
-/// Checks the end of the command with the fault.
-fn check_end(trial: &Trial<'_>, fault: FaultKind, ended: &Ended, at: &Path) -> Result<()> {
+/// Checks exit code and output of the command with the fault.
+fn check_end(trial: &Trial<'_>, fault: FaultKind, ended: &CommandOutput, at: &Path) -> Result<()> {
     if fault.ends_process() {
         let code = ended.code;
         anyhow::ensure!(code == Some(CRASHED), "exit code {code:?} instead of a crash");

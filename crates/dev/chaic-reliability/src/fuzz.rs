@@ -1,6 +1,6 @@
 //! Fuzzing of all parsers: changed copies of valid inputs, without instrumentation.
 //!
-//! An input with a new message joins the inputs that are changed further, so that changes add up.
+//! An input with a new error message joins the pool of inputs, so that changes accumulate.
 //! Promises: no panic, no hang, bounded memory, and a message of one line.
 
 mod import;
@@ -26,21 +26,22 @@ use self::mutate::{Format, mutate};
 use self::targets::{TARGETS, Target};
 use crate::process_status::{peak_memory_kib, reset_peak_memory};
 
-/// Longest time of one input. Longer counts as a hang; the slowest parser takes a tenth of a second.
+/// Maximum parsing time of one input. A longer time counts as a hang; the slowest parser takes a
+/// tenth of a second.
 const MAX_DURATION: Duration = Duration::from_secs(60);
-/// Most memory that parsing adds, KiB: a hundred times the largest input, and an exec message with
-/// the images of the largest observation.
+/// Maximum memory that parsing may add, KiB: a hundred times the largest input, and an exec message
+/// with the images of the largest observation.
 const MAX_MEMORY_KIB: u64 = 1 << 20;
-/// Most inputs in memory per parser.
+/// Maximum number of inputs in memory per parser.
 const MAX_POOL: usize = 512;
-/// Most different messages that are counted per parser, so that they need little memory.
+/// Maximum number of different messages that are counted per parser; it bounds the memory.
 const MAX_MESSAGES: usize = 10_000;
-/// Longest input that the corpus keeps, bytes, so that the repository stays small.
+/// Maximum size of an input that the corpus keeps, bytes, so that the repository stays small.
 const MAX_KEPT_BYTES: usize = 2 << 10;
-/// Most inputs that the corpus keeps per parser.
+/// Maximum number of inputs that the corpus keeps per parser.
 const MAX_KEPT: usize = 24;
 
-/// Head of the table.
+/// Header of the printed table.
 const HEAD: &str = "| parser | inputs | messages | failures | memory, MiB |\n|---|--:|--:|--:|--:|";
 
 /// Options of `fuzz`.
@@ -70,7 +71,7 @@ pub struct FuzzOptions {
 }
 
 /// Result for one parser.
-struct Fuzzed {
+struct FuzzResult {
     n_inputs: u64,
     /// Number of different messages.
     n_messages: usize,
@@ -80,7 +81,7 @@ struct Fuzzed {
 
 /// Input that is being parsed, for the watchdog.
 #[derive(Default)]
-struct Current {
+struct CurrentInput {
     /// Corpus of the parser.
     folder: PathBuf,
     input: Vec<u8>,
@@ -99,7 +100,7 @@ pub fn run_all(options: &FuzzOptions) -> Result<bool> {
     }
     let dir = tempfile::tempdir().context("no temporary folder")?;
     let inputs = Inputs::new(dir.path())?;
-    let current = Arc::new(Mutex::new(Current::default()));
+    let current = Arc::new(Mutex::new(CurrentInput::default()));
     watch(Arc::clone(&current));
     report_other_panics(Arc::clone(&current));
     let mut n_failures = 0;
@@ -116,7 +117,7 @@ pub fn run_all(options: &FuzzOptions) -> Result<bool> {
             eprintln!("{}: {failure}", target.name);
         }
         n_failures += fuzzed.failures.len();
-        let Fuzzed { n_inputs, n_messages, failures } = fuzzed;
+        let FuzzResult { n_inputs, n_messages, failures } = fuzzed;
         let (name, n) = (target.name, failures.len());
         println!("| {name} | {n_inputs} | {n_messages} | {n} | {} |", added_kib >> 10);
     }
@@ -131,8 +132,8 @@ fn select(names: &[String]) -> Result<Vec<&'static Target>> {
     Ok(TARGETS.iter().filter(|t| names.is_empty() || names.iter().any(|n| n == t.name)).collect())
 }
 
-/// Prints panics outside of parsers. Those of a parser are reported with its input.
-fn report_other_panics(current: Arc<Mutex<Current>>) {
+/// Prints panics outside of parsers. A panic in a parser is reported with its input.
+fn report_other_panics(current: Arc<Mutex<CurrentInput>>) {
     let print = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
         if current.lock().unwrap_or_else(PoisonError::into_inner).began.is_none() {
@@ -141,8 +142,8 @@ fn report_other_panics(current: Arc<Mutex<Current>>) {
     }));
 }
 
-/// Ends the process when one input takes too long. The input joins the corpus of its parser.
-fn watch(current: Arc<Mutex<Current>>) {
+/// Ends the process if one input takes too long, and adds the input to the corpus of its parser.
+fn watch(current: Arc<Mutex<CurrentInput>>) {
     std::thread::spawn(move || {
         loop {
             std::thread::sleep(Duration::from_secs(1));
@@ -162,8 +163,8 @@ fn fuzz(
     target: &Target,
     inputs: &Inputs,
     options: &FuzzOptions,
-    current: &Mutex<Current>,
-) -> Result<Fuzzed> {
+    current: &Mutex<CurrentInput>,
+) -> Result<FuzzResult> {
     let folder = options.corpus.join(target.name);
     current.lock().unwrap_or_else(PoisonError::into_inner).folder = folder.clone();
     let seeds = (target.seeds)(inputs).with_context(|| format!("parser {}", target.name))?;
@@ -171,7 +172,7 @@ fn fuzz(
     let mut pool = seeds.clone();
     pool.append(&mut kept.clone());
     let mut rng = RngStream::new(options.seed, target.name, 0);
-    let mut fuzzed = Fuzzed { n_inputs: 0, n_messages: 0, failures: Vec::new() };
+    let mut fuzzed = FuzzResult { n_inputs: 0, n_messages: 0, failures: Vec::new() };
     let mut messages = BTreeSet::new();
     let mut queue = pool.clone();
     let began = Instant::now();
@@ -220,7 +221,7 @@ fn parse(
     target: &Target,
     inputs: &Inputs,
     input: &[u8],
-    current: &Mutex<Current>,
+    current: &Mutex<CurrentInput>,
 ) -> Result<String, String> {
     let set = |began: Option<Instant>| {
         let mut current = current.lock().unwrap_or_else(PoisonError::into_inner);

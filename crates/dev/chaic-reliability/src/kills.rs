@@ -19,7 +19,7 @@ use crate::trial::Trial;
 /// Time between two messages about the progress.
 const PROGRESS_INTERVAL: Duration = Duration::from_secs(10);
 
-/// Most kills of one command and its ways back.
+/// Maximum number of kills of one command and of its recovery commands.
 const MAX_KILLS: usize = 3;
 
 /// Options of `kills`.
@@ -85,12 +85,12 @@ fn duration(trial: &Trial<'_>, at: &Path) -> Result<Duration> {
     Ok(began.elapsed())
 }
 
-/// Starts and kills the command and its ways back, at random times; returns the number of processes
-/// that were killed before they ended.
+/// Starts and kills the command and its recovery commands, at random times; returns the number of
+/// processes that were killed before they ended.
 fn kill(trial: &Trial<'_>, at: &Path, duration: Duration, rng: &mut RngStream) -> Result<u32> {
     let mut n_killed = 0;
     for _ in 0..=rng.below(MAX_KILLS) {
-        let arguments = words(trial.way_back(at)?);
+        let arguments = words(trial.recovery_command(at)?);
         let mut command = chaic(at, None, None)?;
         command.args(arguments).stdout(Stdio::null()).stderr(Stdio::null());
         let mut child = command.spawn().context("can't start")?;

@@ -2,8 +2,8 @@
 //!
 //! **What it is not**: a part of the command. Only this program can let file operations fail.
 
+mod command_output;
 mod commands;
-mod ended;
 mod faults;
 mod folder;
 mod fuzz;

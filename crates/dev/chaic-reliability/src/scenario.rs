@@ -1,4 +1,4 @@
-//! Commands that write files, with their inputs and the way back after an interruption.
+//! Commands that write files, with their inputs and the recovery after an interruption.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -54,7 +54,7 @@ pub struct Reader {
 pub struct Scenario {
     /// Name for the command line.
     pub name: &'static str,
-    /// True if it takes seconds; it runs only if it is named.
+    /// True if the scenario takes seconds; it then runs only if the command line names it.
     pub is_long: bool,
     /// Preparation in an empty folder.
     pub steps: &'static [Step],
@@ -64,7 +64,7 @@ pub struct Scenario {
     pub outputs: &'static [&'static str],
     /// True if the contents of its files are random, so that only their names are compared.
     pub has_random_contents: bool,
-    /// Way back after an interruption.
+    /// Recovery after an interruption.
     pub recovery: Recovery,
     /// Readers of the result, which run after the interruption and again after the recovery.
     pub readers: &'static [Reader],
@@ -74,7 +74,7 @@ pub struct Scenario {
 pub const GENERATE: Step = Step::Run("episodes generate --task shopping --seeds 0..1 --out e");
 /// Steps that generate a short episode in `e`.
 pub const EPISODE_STEPS: [Step; 2] = [GENERATE, Step::Shorten("e")];
-/// Arguments that play it in `run`.
+/// Arguments that play this episode into the run folder `run`.
 pub const PLAY: &str = "eval --episodes e --helper none,rhp --size 16 --jobs 1 --out run";
 const PLAYED: [Step; 3] = [GENERATE, Step::Shorten("e"), Step::Run(PLAY)];
 const RESUME_RUN: Recovery =

@@ -108,7 +108,7 @@ fn sample(n_episodes: usize) -> Sample {
     Sample { n_episodes, memory_kib, descriptors, threads }
 }
 
-/// Number of lines of a growing file, which is read piece by piece.
+/// Counter of the lines of a growing file, which is read piece by piece.
 #[derive(Debug, Default)]
 struct LineCounter {
     n_lines: usize,

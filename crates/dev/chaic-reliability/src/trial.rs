@@ -1,4 +1,4 @@
-//! Interrupted commands: their way back gives the result of an undisturbed command.
+//! Interrupted commands: their recovery gives the result of an undisturbed command.
 
 use std::path::Path;
 
@@ -58,7 +58,7 @@ impl<'a> Trial<'a> {
     /// Checks that readers accept no half-written result in the folder `at`.
     ///
     /// # Errors
-    /// If a reader panics, fails without one line of explanation, or accepts too much.
+    /// If a reader panics, fails without one line of explanation, or accepts a wrong result.
     pub fn check_readers(&self, at: &Path) -> Result<()> {
         for (reader, expected) in self.scenario.readers.iter().zip(&self.read) {
             let read = run(at, &words(reader.command), None)?;
@@ -80,7 +80,7 @@ impl<'a> Trial<'a> {
     ///
     /// # Errors
     /// If an output cannot be removed.
-    pub fn way_back(&self, at: &Path) -> Result<&'static str> {
+    pub fn recovery_command(&self, at: &Path) -> Result<&'static str> {
         match self.scenario.recovery {
             Recovery::Resume { marker, command } if at.join(marker).exists() => return Ok(command),
             Recovery::StartOver => {
@@ -97,14 +97,14 @@ impl<'a> Trial<'a> {
     /// # Errors
     /// If a command fails, or files or outputs differ from those of an undisturbed command.
     pub fn complete(&self, at: &Path) -> Result<()> {
-        let command = self.way_back(at)?;
-        run_ok(at, &words(command)).context("the way back")?;
+        let command = self.recovery_command(at)?;
+        run_ok(at, &words(command)).context("the recovery")?;
         let changed = differences(&self.scenario.result(at)?, &self.expected);
         anyhow::ensure!(changed.is_empty(), "different files after `{command}`: {changed:?}");
         for (reader, expected) in self.scenario.readers.iter().zip(&self.read) {
-            let read = run_ok(at, &words(reader.command)).context("after the way back")?;
+            let read = run_ok(at, &words(reader.command)).context("after the recovery")?;
             let is_equal = !reader.is_exact || read.stdout == *expected;
-            anyhow::ensure!(is_equal, "`{}` differs after the way back", reader.command);
+            anyhow::ensure!(is_equal, "`{}` differs after the recovery", reader.command);
         }
         Ok(())
     }

@@ -1,12 +1,12 @@
 //! Promise: a small sample of every measurement of docs/reliability.md passes, and a broken promise is
 //! reported.
 
-#[path = "../src/ended.rs"]
-mod ended;
+#[path = "../src/command_output.rs"]
+mod command_output;
 
 use std::process::{Command, Output};
 
-use ended::Ended;
+use command_output::CommandOutput;
 
 fn reliability(arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_chaic-reliability"));
@@ -31,7 +31,7 @@ fn file_faults_of_a_merge_and_of_seals_leave_no_corrupt_result() {
 #[test]
 fn output_explains_findings_but_no_other_exit_code() {
     let problem = |code: Option<i32>, stdout: &str, stderr: &str| {
-        Ended { code, stdout: stdout.to_owned(), stderr: stderr.to_owned() }.problem()
+        CommandOutput { code, stdout: stdout.to_owned(), stderr: stderr.to_owned() }.problem()
     };
     for code in [Some(1), Some(2)] {
         assert_eq!(problem(code, "", "error: the disk is full\n"), None);

@@ -239,7 +239,8 @@ impl InputGenerator {
             })
             .collect();
         if self.chance(self.hostile) {
-            // A recording of another episode has more or fewer objects.
+            // The state may have more or fewer objects than the setup, like a recording of another
+            // episode.
             things.truncate(self.int_up_to(things.len()));
             let more = self.int_up_to(3);
             things.extend(things.first().cloned().into_iter().cycle().take(more));
@@ -302,7 +303,7 @@ impl InputGenerator {
             _ => {}
         }
         let eye_in_world = match self.int_up_to(5) {
-            // Inside an object or a wall, or exactly on a corner.
+            // The camera is inside an object or a wall, or exactly on a corner.
             0 if !setup.things.is_empty() => {
                 let object = self.pick(&setup.things);
                 object.position + Vec3::new(0.0, 0.5 * object.size_m().y, 0.0)
@@ -360,8 +361,8 @@ impl InputGenerator {
     }
 }
 
-/// Generates the case of a seed, the same on every machine. One third of the cases has valid
-/// numbers only, one third a few hostile ones, one third many.
+/// Generates the case of a seed, the same on every machine. One third of the cases has only valid
+/// numbers, one third has a few hostile numbers, and one third has many.
 pub fn case(seed: u64, n_things: Option<usize>) -> Case {
     let hostile = [0.0, 0.02, 0.25][(seed % 3) as usize];
     let mut generator =

@@ -4,7 +4,7 @@ use chaic_core::geom::math;
 use chaic_nn::{AdamWConfig, Network, Pass};
 use chaic_training::Learner;
 
-/// Network with a logit per action and outputs of the state, such as its value.
+/// Network that computes one logit per action, and state outputs such as the value estimate.
 pub trait ActorCritic: Sync {
     /// Input of the network.
     type Observation: Sync;
@@ -33,12 +33,12 @@ pub trait ActorCritic: Sync {
     );
 }
 
-/// Outputs for one observation.
+/// Outputs of an actor-critic network for one observation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ActorCriticOutput {
     /// Log-probability of each action.
     pub log_probs: Vec<f32>,
-    /// Outputs of the state head; those of a policy are the value estimate alone.
+    /// Outputs of the state head. A policy has one of them: the value estimate.
     pub values: Vec<f32>,
 }
 
@@ -76,7 +76,7 @@ impl ActorCriticOutput {
         output.sample(unit)
     }
 
-    /// Returns the most probable action, the first of equal ones.
+    /// Returns the index of the most probable action; the lowest index wins ties.
     pub fn argmax(&self) -> usize {
         let mut best = 0;
         for (k, l) in self.log_probs.iter().enumerate() {
@@ -106,8 +106,8 @@ pub struct Optimizer<'a> {
     pub learning_rate: f32,
 }
 
-/// Number of samples that pass through the network together. Gradients of a shard add up over its
-/// micro-batches, whose activations stay in the cache.
+/// Number of samples per forward pass. A shard accumulates the gradients of its micro-batches. The
+/// activations of one micro-batch fit into the CPU cache.
 const MICRO_BATCH: usize = 16;
 
 /// Takes one data-parallel optimizer step along the mean gradient of a batch.

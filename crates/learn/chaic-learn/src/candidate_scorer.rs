@@ -2,8 +2,8 @@
 //!
 //! Number and order of candidates differ between decisions. Each candidate is scored together with
 //! the state, as in pointer networks (Vinyals et al. 2015). The candidates of a decision, a row for
-//! the state and rows of earlier decisions attend to each other (Vaswani et al. 2017), so that scores
-//! and value depend on all of them, in any order.
+//! the state and rows of earlier decisions attend to each other (Vaswani et al. 2017), so scores and
+//! value depend on all rows, but not on their order.
 
 use std::ops::Range;
 
@@ -41,7 +41,7 @@ pub struct CandidateScorer {
 }
 
 /// Parameter ranges of the input normalization: means, inverse standard deviations, and the numbers
-/// of states and candidates that they cover.
+/// of states and candidates in these statistics.
 #[derive(Clone, Debug)]
 struct Normalizer {
     mean: Range<usize>,
@@ -55,7 +55,8 @@ const N_HEADS: usize = 4;
 const MAX_INPUT: f32 = 10.0;
 /// Minimum standard deviation of an input.
 const MIN_STD_DEV: f64 = 0.05;
-/// Maximum count of earlier inputs, so that the statistics still adapt.
+/// Maximum weight of earlier inputs in the running statistics, samples. Without it, late inputs
+/// would have no effect.
 const MAX_COUNT: f64 = 1e6;
 
 impl Normalizer {
@@ -147,8 +148,8 @@ impl CandidateScorer {
         }
     }
 
-    /// Updates the running statistics that normalize later inputs. Before the first update inputs
-    /// are not changed. The last `n_raw` features of candidates are never changed.
+    /// Updates the running statistics that normalize later inputs. Before the first update, inputs
+    /// are not normalized. The last `n_raw` features of candidates are never normalized.
     pub fn update_normalizer<'a>(
         &self,
         parameters: &mut [f32],
@@ -177,8 +178,8 @@ impl CandidateScorer {
         1 + decision.n_candidates + decision.memory.len() / (self.n_state + self.n_candidate)
     }
 
-    /// Returns the input rows: for each decision one of the state alone, for the state outputs, one
-    /// per candidate, and one per earlier decision.
+    /// Returns the input rows of each decision: one row with the state alone (for the state
+    /// outputs), one row per candidate, and one row per earlier decision.
     fn rows<'a>(
         &self,
         parameters: &[f32],

@@ -2,7 +2,7 @@
 //! et al. 2011).
 //!
 //! The expert has the observations, memory and grants of the learner, and the goal if
-//! [`ExpertInfo::knows_goal`] is true. [`EXPERTS`] lists those that can be imitated.
+//! [`ExpertInfo::knows_goal`] is true. [`EXPERTS`] lists the experts.
 
 use std::sync::PoisonError;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -25,17 +25,18 @@ use crate::policy::{LearnedPolicy, StepLog, StepRecord};
 /// Expert that can be imitated.
 #[derive(Clone, Copy, Debug)]
 pub struct ExpertInfo {
-    /// Name in configurations: that of the helper with the same rules.
+    /// Name in configurations, equal to the name of the helper with the same rules.
     pub name: &'static str,
-    /// True if the expert is granted the goal. Its choices then depend on what the learner cannot know,
-    /// so a clone cannot reach it.
+    /// True if the expert knows the partner's goal. Its choices then depend on information that the
+    /// learner lacks, so a clone cannot perform as well.
     pub knows_goal: bool,
     /// Creates its policy.
     pub policy: fn() -> Box<dyn Policy>,
 }
 
-/// All experts: the rule-based helpers that choose among the learner's plans. Two built-in helpers need the
-/// granted state, which the learner's observations lack, and `random` draws its choices.
+/// All experts: the rule-based helpers that choose among the learner's plans. The other built-in helpers
+/// are no experts: `ideal_observer` and `oracle_plan` need the granted state, which the learner lacks, and
+/// `random` chooses at random.
 pub static EXPERTS: [ExpertInfo; 8] = [
     ExpertInfo { name: "infer", knows_goal: false, policy: || infer(InferOptions::ALL) },
     ExpertInfo {
@@ -118,7 +119,7 @@ impl ExpertPolicy {
         ExpertPolicy { expert: (expert.policy)(), goal, actor, log }
     }
 
-    /// Returns the briefing of the expert, if it differs from that of the learner.
+    /// Returns the expert's briefing if it differs from the learner's.
     fn expert_briefing(&self, briefing: &Briefing) -> Option<Briefing> {
         let goal = self.goal.clone()?;
         Some(Briefing { goal: Some(goal), ..briefing.clone() })
@@ -234,7 +235,7 @@ pub struct CloningMetrics {
 pub struct FitConfig<'a> {
     /// Optimizer.
     pub optimizer: Optimizer<'a>,
-    /// Probability that the labels spread evenly over all candidates.
+    /// Label smoothing: probability mass that is spread evenly over all candidates.
     pub label_smoothing: f32,
     /// Number of optimizer steps.
     pub n_steps: usize,

@@ -16,7 +16,8 @@ pub const N_MEMORY_PLAN: usize = 2;
 pub(crate) struct DecisionMemory {
     capacity: usize,
     decisions: VecDeque<EarlierDecision>,
-    /// Encoded decision, before the rows got [`N_MEMORY_PLAN`], whose choice is not known yet.
+    /// Encoded decision whose choice is not known yet. Its rows lack the [`N_MEMORY_PLAN`]
+    /// features.
     pending: Option<CandidateSet>,
 }
 
@@ -53,7 +54,7 @@ impl DecisionMemory {
     }
 
     /// Records the chosen candidate of the last encoded decision; `None` if the agent did something
-    /// else, which is not remembered.
+    /// else, so nothing is remembered.
     pub(crate) fn record(&mut self, chosen: Option<usize>, frame: Frame) {
         let (Some(pending), Some(chosen)) = (self.pending.take(), chosen) else { return };
         let CandidateSet { state, candidates, n_candidates, .. } = pending;

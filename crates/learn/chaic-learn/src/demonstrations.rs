@@ -14,7 +14,7 @@ use crate::cloning::Demonstration;
 /// about 0.1 MB, or 1.5 MB if each decision holds 32 earlier ones.
 const MAX_BYTES: u64 = 1 << 34;
 
-/// Sections of a file. Counts are the numbers of episodes and of demonstrations.
+/// Names of the sections of a file. `COUNTS` holds the numbers of episodes and of demonstrations.
 const COUNTS: &str = "demonstrations.counts";
 const N_CANDIDATES: &str = "demonstrations.n_candidates";
 const ACTIONS: &str = "demonstrations.actions";
@@ -101,7 +101,7 @@ impl Demonstrations {
     }
 }
 
-/// Writes a file of at most `max_bytes`; more would be cut off when it is read.
+/// Writes a file. Refuses more than `max_bytes`, because readers would truncate a larger file.
 fn write_within(path: &Path, bytes: &[u8], max_bytes: u64) -> Result<(), FileError> {
     let n = bytes.len() as u64;
     if n > max_bytes {

@@ -26,9 +26,9 @@ use crate::scales::{
     DISTANCE_SCALE_M, TARGET_SETS, TIME_SCALE_FRAMES, flag, log_mass, normalize_clamped, recency,
 };
 
-/// Features of the state. Three per target set follow: the number of its objects that the partner
-/// is believed to have taken, the number available, and the probability that it is the partner's.
-/// The probability of each kind of person comes last.
+/// Features of the state. Three features per target set follow: the number of objects that the
+/// partner has probably taken, the number of available objects, and the probability that the
+/// partner wants the set. The last features are the probabilities of each kind of person.
 pub const STATE_FEATURES: [&str; 35] = [
     "time_left",
     "horizon",
@@ -110,9 +110,11 @@ pub const N_PLAN: usize = N_KINDS + PLAN_FEATURES.len() + TARGET_SETS.len();
 /// Number of additional state features with an opponent model: goal probabilities and limits.
 pub const N_OPPONENT_STATE: usize = N_GOALS + N_LIMITS;
 /// Number of additional plan features with an opponent model. They are the probability that the
-/// plan's class is the partner's target, alone and times that of the goal to pick up.
+/// plan's class is the partner's target, given the goal to pick up, and its product with the
+/// probability of that goal.
 pub const N_OPPONENT_PLAN: usize = 2;
-/// Number of additional plan features with proposals: whether `infer` would choose the plan.
+/// Number of additional plan features with the infer hint: whether the helper `infer` would choose
+/// the plan.
 pub const N_PROPOSAL_PLAN: usize = 1;
 /// Number of kinds of plans.
 const N_KINDS: usize = Plan::KINDS.len();
@@ -120,8 +122,8 @@ const N_KINDS: usize = Plan::KINDS.len();
 /// Approximate walking speed, meters per frame, to estimate the remaining time.
 const WALKING_M_PER_FRAME: f32 = 0.04;
 
-/// Returns the classes of objects that the partner is believed to have taken: seen taken or held by
-/// it, or missing from their place and not handled by the helper.
+/// Returns the classes of the objects that the partner has probably taken. The partner was seen to
+/// take or hold them, or they are missing and the helper did not handle them.
 fn taken_by_partner(context: &Context<'_>) -> Vec<ClassId> {
     let Context { memory, behavior, .. } = context;
     let mut tracks: Vec<_> = behavior.partner_taken.clone();
@@ -146,19 +148,20 @@ fn unexplored(memory: &Memory) -> f32 {
     (0..n).filter(|cell| memory.map.is_unexplored(*cell)).count() as f32 / n.max(1) as f32
 }
 
-/// Encoder of plan choices, with the history and the belief that the memory lacks.
+/// Encoder of plan choices. It also keeps the history and the belief, which the memory does not
+/// contain.
 #[derive(Clone)]
 pub struct FeatureEncoder {
     /// Previous choices.
     pub history: PlanHistory,
     episode: Option<(Briefing, Belief)>,
     opponent: Option<OpponentTracker>,
-    /// The helper `infer`, whose choices are marked.
-    proposer: Option<InferPolicy>,
+    /// Policy of the helper `infer`, whose choice is marked as a hint.
+    infer_policy: Option<InferPolicy>,
     memory: DecisionMemory,
 }
 
-/// Inputs of a policy besides those of memory and belief.
+/// Optional inputs of a policy, in addition to the features of memory and belief.
 #[derive(Clone, Debug, Default)]
 pub struct OptionalInputs {
     /// Opponent model whose predictions are added.
@@ -176,7 +179,7 @@ impl FeatureEncoder {
             history: PlanHistory::default(),
             episode: None,
             opponent: inputs.opponent.map(OpponentTracker::new),
-            proposer: inputs.has_infer_hint.then(|| InferPolicy::new(InferOptions::ALL)),
+            infer_policy: inputs.has_infer_hint.then(|| InferPolicy::new(InferOptions::ALL)),
             memory: DecisionMemory::new(inputs.memory),
         }
     }
@@ -189,19 +192,19 @@ impl FeatureEncoder {
         if let Some(opponent) = &mut self.opponent {
             opponent.reset(briefing);
         }
-        if let Some(proposer) = &mut self.proposer {
-            proposer.reset(briefing);
+        if let Some(infer_policy) = &mut self.infer_policy {
+            infer_policy.reset(briefing);
         }
     }
 
     /// Adds an observation, after the memory has.
     pub fn observe(&mut self, observation: &Observation, memory: &Memory, behavior: &BehaviorLog) {
-        if let Some(proposer) = &mut self.proposer {
-            proposer.observe(observation, memory, behavior);
+        if let Some(infer_policy) = &mut self.infer_policy {
+            infer_policy.observe(observation, memory, behavior);
         }
         let Some((briefing, belief)) = &mut self.episode else { return };
-        // The proposer has the same belief.
-        if self.proposer.is_none() {
+        // The policy of `infer` maintains the same belief, so it is updated only once.
+        if self.infer_policy.is_none() {
             belief.observe(briefing, memory, behavior);
         }
         if let Some(opponent) = &mut self.opponent {
@@ -209,10 +212,11 @@ impl FeatureEncoder {
         }
     }
 
-    /// Minimum height of goal places that count in every task that the partner may have, meters.
+    /// Returns the minimum height of goal places that count in every task that the partner may
+    /// have, meters.
     pub fn goal_place_min_top_m(&self, memory: &Memory) -> Option<f32> {
         let (briefing, belief) = self.episode.as_ref()?;
-        let belief = self.proposer.as_ref().and_then(InferPolicy::belief).unwrap_or(belief);
+        let belief = self.infer_policy.as_ref().and_then(InferPolicy::belief).unwrap_or(belief);
         belief.goal_place_min_top_m(briefing, memory)
     }
 
@@ -223,20 +227,23 @@ impl FeatureEncoder {
         valid: &[Plan],
         candidates: &[Plan],
     ) -> CandidateSet {
-        let mut encoded = self.encode_without_proposals(context, candidates);
-        if let Some(proposer) = &mut self.proposer {
-            let proposal = proposer.choose(context, valid).ok();
-            // A proposal that does not replace the current plan is to continue.
-            let proposal = match self.history.reconsidered() {
-                Some(current) if !proposal.is_some_and(|p| proposer.supersedes(&p, &current)) => {
+        let mut encoded = self.encode_without_infer_hint(context, candidates);
+        if let Some(infer_policy) = &mut self.infer_policy {
+            let hinted_plan = infer_policy.choose(context, valid).ok();
+            // If the hinted plan does not supersede the current plan, the hint is to continue the
+            // current plan.
+            let hinted_plan = match self.history.reconsidered() {
+                Some(current)
+                    if !hinted_plan.is_some_and(|p| infer_policy.supersedes(&p, &current)) =>
+                {
                     Some(current)
                 }
-                _ => proposal,
+                _ => hinted_plan,
             };
             let rows = encoded.candidates.chunks_exact(encoded.candidates.len() / candidates.len());
             let mark = |(row, plan): (&[f32], &Plan)| {
                 let mut row = row.to_vec();
-                row.push(flag(Some(*plan) == proposal));
+                row.push(flag(Some(*plan) == hinted_plan));
                 row
             };
             encoded.candidates = rows.zip(candidates).flat_map(mark).collect();
@@ -252,14 +259,14 @@ impl FeatureEncoder {
         self.memory.record(chosen, frame);
     }
 
-    fn encode_without_proposals(
+    fn encode_without_infer_hint(
         &mut self,
         context: &Context<'_>,
         candidates: &[Plan],
     ) -> CandidateSet {
         let prior;
-        let proposed = self.proposer.as_ref().and_then(InferPolicy::belief);
-        let belief = match (proposed, &self.episode) {
+        let infer_belief = self.infer_policy.as_ref().and_then(InferPolicy::belief);
+        let belief = match (infer_belief, &self.episode) {
             (Some(belief), _) | (None, Some((_, belief))) => belief,
             (None, None) => {
                 prior = Belief::new(context.briefing);

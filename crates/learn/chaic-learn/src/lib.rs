@@ -1,13 +1,14 @@
 //! Helpers that learn to choose plans or actions, and their trainings.
 //!
 //! **What it is**: [`actor_critic`] is the interface of policy networks, [`candidate_scorer`] a
-//! network for any number of candidates, [`ppo`] proximal policy optimization. [`features`] encodes
-//! a decision between plans; predictions of the [`opponent`] model and earlier decisions may extend
-//! it. [`policy`] lets a network drive an agent, [`policy_kind`] lists networks by their inputs, and
+//! network for any number of candidates, [`ppo`] proximal policy optimization. [`features`] encodes a
+//! decision between plans; predictions of the [`opponent`] model and earlier decisions may extend it.
+//! [`policy`] lets a network drive an agent, [`policy_kind`] lists networks by their inputs, and
 //! [`rollout`] plays episodes. [`cloning`] learns from an expert whose choices [`demonstrations`]
-//! keeps, and [`train`] has the trainers. [`visual`] has policies that read images, [`partner`] those
-//! of partners. [`helpers`] makes them helpers and partners of a run, and [`bundled`] lists those that
-//! are part of chaic. [`toy`] has tasks with a known best return, which test the learner.
+//! keeps, and [`train`] has the trainers. [`visual`] has policies that read images, and [`partner`]
+//! has policies of partners. [`helpers`] registers policies as helpers and partners of a run, and
+//! [`bundled`] lists the policies that are part of chaic. [`toy`] has tasks with a known best return,
+//! which test the learner.
 //!
 //! **What it is not**: it knows no rules of tasks. Perception, memory and execution of plans are
 //! those of `chaic-agents`; a learned helper has no other inputs.

@@ -1,4 +1,4 @@
-//! Policy of either kind, from weights files.
+//! Policy loaded from weights files: it chooses among plans, or it reads images.
 
 use std::sync::Arc;
 

@@ -6,7 +6,7 @@ use chaic_core::{Briefing, ClassId, Frame, Role};
 /// Number of kinds of plans.
 const N_KINDS: usize = Plan::KINDS.len();
 
-/// Minimum time between reconsiderations of plans to explore, follow or wait, frames: that of
+/// Minimum time between reconsiderations of plans to explore, follow or wait, frames: as in
 /// `chaic_agents::policies::infer`.
 const IDLE_FRAMES: Frame = 60;
 /// Minimum time between reconsiderations of walks to objects, frames: as above.
@@ -69,7 +69,7 @@ impl PlanHistory {
         is_due
     }
 
-    /// The unfinished plan that the next choice reconsiders, if any.
+    /// Returns the unfinished plan that the next choice reconsiders, if any.
     pub fn reconsidered(&self) -> Option<Plan> {
         self.reconsidered
     }
@@ -88,8 +88,9 @@ impl PlanHistory {
     }
 }
 
-/// Returns whether a learned policy may replace the unfinished plan `current` by `new`: as
-/// [`Plan::supersedes`], and also a walk by another walk and an idle plan by another idle plan.
+/// Returns whether a learned policy may replace the unfinished plan `current` by `new`. It may if
+/// [`Plan::supersedes`] holds, if both plans are pick-ups ([`Plan::is_pick`]), or if both are idle
+/// plans.
 pub fn may_replace(new: &Plan, current: &Plan) -> bool {
     let is_idle = |p: &Plan| matches!(p, Plan::Explore | Plan::FollowPartner | Plan::Wait);
     let is_exchange =

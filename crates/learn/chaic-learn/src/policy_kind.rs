@@ -32,7 +32,7 @@ pub struct PolicyKind {
 }
 
 impl PolicyKind {
-    /// No further inputs.
+    /// Policy without optional inputs.
     pub const PLAIN: PolicyKind =
         PolicyKind { opponent: OpponentInput::None, has_infer_hint: false, memory: 0 };
 
@@ -45,7 +45,7 @@ impl PolicyKind {
         })
     }
 
-    /// Number of state features and of features per plan.
+    /// Returns the number of state features and the number of features per plan.
     pub fn n_features(self) -> (usize, usize) {
         let (n_state, n_plan) = match self.opponent {
             OpponentInput::None => (N_STATE, N_PLAN),
@@ -67,7 +67,7 @@ impl PolicyKind {
         model
     }
 
-    /// Name in weights files.
+    /// Returns the name in weights files.
     pub fn name(self) -> String {
         let proposals = if self.has_infer_hint { ", proposals of infer" } else { "" };
         let memory = match self.memory {
@@ -95,7 +95,7 @@ pub struct PolicyWeights {
     pub parameters: Vec<f32>,
     /// Opponent model whose predictions are inputs, if the network needs one.
     pub opponent: Option<Arc<OpponentModel>>,
-    /// Digest of the weights file, if they are from one.
+    /// Digest of the weights file, if the parameters come from a file.
     pub digest: Option<String>,
 }
 
@@ -130,8 +130,8 @@ impl PolicyWeights {
         FeatureEncoder::new(OptionalInputs { opponent, has_infer_hint, memory })
     }
 
-    /// Returns the grants of a helper with this policy: those of the paper's helpers, and the
-    /// partner's actions if its opponent model needs them.
+    /// Returns the grants of a helper with this policy: the grants of the paper's helpers, and the
+    /// partner's actions if the opponent model needs them.
     pub fn grants(&self) -> Grants {
         let behavior = self.opponent.as_ref().is_some_and(|model| model.is_granted());
         Grants { behavior, ..Grants::PLANNER }

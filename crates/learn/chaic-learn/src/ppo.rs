@@ -95,7 +95,8 @@ pub(crate) const fn ppo_bounds(max_batch: i64) -> [(&'static str, Bound); 13] {
     [
         ("gamma", FRACTION),
         ("gae_lambda", FRACTION),
-        // Without a clip range nothing is learned; above 1 probabilities may drop to 0 in one step.
+        // With a clip range of 0 nothing is learned; with more than 1, probabilities may drop to 0
+        // in one step.
         ("clip_range", real(1e-3, 1.0)),
         ("clip_range_vf", real(0.0, 1e6)),
         ("ent_coef", real(0.0, 100.0)),
@@ -128,7 +129,7 @@ pub struct Transition<S = CandidateSet> {
     pub value: f32,
     /// Rewards until the next decision or the end, discounted to this one.
     pub reward: f32,
-    /// Duration until then, time units.
+    /// Time until the next decision or the end, time units.
     pub duration: f32,
 }
 
@@ -226,9 +227,9 @@ pub struct Schedule {
 
 /// Runs `n_epochs` of minibatch PPO on `trajectories`, as Stable-Baselines3 does.
 ///
-/// `reference` are the parameters of the policy that the KL penalty refers to. `schedule` seeds the
-/// shuffle and anneals the learning rate. Returns `None` if `stop` is raised; some steps may have
-/// been taken.
+/// `reference` holds the parameters of the initial policy, from which the KL penalty measures the
+/// divergence. `schedule` seeds the shuffle and anneals the learning rate. Returns `None` if `stop`
+/// is raised; some steps may have been taken.
 pub fn update<M: ActorCritic>(
     config: &PpoConfig,
     model: &M,
@@ -248,7 +249,7 @@ pub fn update<M: ActorCritic>(
     }
     if let Some(reference) = reference {
         samples.par_chunks_mut(REFERENCE_BATCH).for_each(|batch| {
-            // The first minibatch then returns `None`.
+            // If `stop` is raised, the first minibatch returns `None`.
             if stop.load(Ordering::Relaxed) {
                 return;
             }
@@ -321,8 +322,8 @@ pub fn update<M: ActorCritic>(
     })
 }
 
-/// Returns the gradient of the loss of one decision times `weight`, and adds its metrics.
-/// `advantage` is normalized.
+/// Returns the gradient of the loss of one decision, multiplied by `weight`, and adds the metrics
+/// of the decision. `advantage` is normalized.
 fn gradient<S>(
     config: &PpoConfig,
     sample: &PpoSample<'_, S>,
@@ -369,7 +370,7 @@ fn gradient<S>(
     OutputGrad { logits, values: vec![grad_value] }
 }
 
-/// Number of decisions whose initial policy is evaluated together.
+/// Batch size for the evaluation of the initial policy, decisions.
 const REFERENCE_BATCH: usize = 256;
 
 /// Normalizes the advantages of a minibatch to mean 0 and variance 1; a single one is unchanged.

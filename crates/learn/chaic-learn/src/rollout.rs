@@ -49,7 +49,7 @@ pub struct RolloutContext<'a> {
     pub selection: ActionSelection,
     /// Weights of the reward terms.
     pub rewards: RewardWeights,
-    /// Discount factor per frame, of rewards between two decisions.
+    /// Discount factor per frame for the rewards between two decisions.
     pub gamma: f32,
     /// Stop flag; a stopped rollout returns nothing.
     pub stop: &'a AtomicBool,
@@ -122,7 +122,7 @@ pub struct EpisodeResult {
 /// Recording of a played episode.
 struct EpisodeRecording {
     records: Vec<StepRecord>,
-    /// Cumulative reward at each frame at which an agent decided.
+    /// Cumulative reward at each frame in which an agent decided.
     cumulative_rewards: Vec<(Frame, f32)>,
     tr: f64,
     frames: Frame,
@@ -260,7 +260,7 @@ pub fn rollout_with_expert(
 /// was stopped.
 ///
 /// # Errors
-/// The first episode's that cannot be played.
+/// The error of the first episode that cannot be played.
 pub fn rollout_all(
     episodes: &[RolloutEpisode],
     weights: &Arc<PolicyWeights>,

@@ -96,16 +96,16 @@ impl TrainingAppearance {
 pub struct RolloutConfig {
     /// Episodes per iteration.
     pub episodes: usize,
-    /// Tasks, whose episodes take turns.
+    /// Tasks, used in turn for successive episodes.
     pub tasks: Vec<TaskId>,
-    /// Generators whose episodes take turns: `gen` (as the paper's) and `gen-standard` (as the
-    /// standard split).
+    /// Generators, used in turn for successive episodes: `gen` (as the paper's) and `gen-standard`
+    /// (as the standard split).
     pub splits: Vec<String>,
-    /// Partners, which take turns: `rules`, a name of `PARTNER_VARIANTS`, `drawn:SEED` or
-    /// `habits:...`. Validation has the rule-based ones.
+    /// Partners, used in turn: `rules`, a name of `PARTNER_VARIANTS`, `drawn:SEED` or `habits:...`.
+    /// Validation uses the rule-based partner.
     pub partners: Vec<String>,
-    /// Width and height of all agents' images during training, pixels. Smaller images hide what the
-    /// partner takes (docs/learning.md).
+    /// Width and height of all agents' images during training, pixels. In smaller images the helper
+    /// misses objects that the partner takes (docs/learning.md).
     pub image_size: u32,
     /// Perception of the helper, as `chaic eval --perception`.
     pub perception: String,
@@ -219,8 +219,8 @@ impl RolloutConfig {
     }
 }
 
-/// Number of seeds that are drawn until one has a valid episode. Of 8,000 tried, all had one
-/// (TESTING.md).
+/// Maximum number of seeds that are drawn to find a valid episode. All of 8,000 tested seeds had
+/// one (TESTING.md).
 const MAX_DRAWS: usize = 100;
 
 /// Returns the id of a training episode of this generator, with the first drawn seed that has a valid
@@ -341,7 +341,7 @@ impl Validation<'_> {
     ) -> Option<Metrics> {
         let RolloutConfig { tasks, splits, validation_episodes: n, .. } = config;
         let episodes = validation_episodes(tasks, splits, *n, stop)?;
-        // Validation has no rewards, so the discount is of no effect.
+        // Validation computes no rewards, so the discount factor has no effect.
         let context = config.context(self.perception, 1.0, stop);
         let rates = |selection| -> Option<Vec<f64>> {
             let results = rollout_all(&episodes, weights, &RolloutContext { selection, ..context });
@@ -355,8 +355,9 @@ impl Validation<'_> {
         Some(named)
     }
 
-    /// Returns the mean transport rate of the baseline, and the mean difference of these rates from it with
-    /// its standard error, if there are two episodes; `None` if `stop` is raised.
+    /// Compares the transport rates of a policy with those of the baseline on the same episodes. Returns
+    /// the baseline's mean, the mean difference, and its standard error if there are two episodes; `None`
+    /// if `stop` is raised.
     pub fn compare(
         &self,
         rates: &[f64],
@@ -372,7 +373,7 @@ impl Validation<'_> {
                 rate.expect("generated episodes can be played")
             };
             let rates: Option<Vec<f64>> = episodes.par_iter().map(rate).collect();
-            // Another value would be the same.
+            // If another thread has set the value, it is equal.
             let _ = self.baseline.set(rates?);
         }
         let baseline = self.baseline.get().expect("it was set above");

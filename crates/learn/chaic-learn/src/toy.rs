@@ -84,7 +84,7 @@ pub struct Maze {
 impl Maze {
     /// Cells along each side.
     pub const SIDE: usize = 6;
-    /// Length of the shortest path, steps.
+    /// Length of the shortest path from start to goal, steps.
     pub const SHORTEST: u32 = 14;
     /// Maximum length of an episode, steps.
     const MAX_STEPS: u32 = 100;

@@ -96,7 +96,8 @@ impl TrainState {
 
     /// Updates the statistics that normalize the network's inputs.
     fn update_normalizer<'a>(&mut self, decisions: impl Iterator<Item = &'a CandidateSet> + Clone) {
-        // Candidates have zeros in place of the features that earlier decisions add.
+        // The features that mark earlier decisions are zero for candidates, so they are not
+        // normalized.
         let n_raw = if self.kind.memory > 0 { N_MEMORY_PLAN } else { 0 };
         self.model.update_normalizer(&mut self.learner.parameters, decisions, n_raw);
     }
@@ -142,7 +143,7 @@ pub trait Algorithm: Clone + Default + Serialize + DeserializeOwned {
     /// Returns the settings that all algorithms share.
     fn spec(&self) -> TrainingSpec<'_>;
 
-    /// Checks what bounds of single numbers cannot express.
+    /// Checks constraints that bounds of single numbers cannot express.
     ///
     /// # Errors
     /// One line that describes the problem.
@@ -233,7 +234,7 @@ impl<A: Algorithm> Trainer for PolicyTrainer<A> {
         let kind = rollout.policy_kind(opponent.as_ref());
         let model = kind.network();
         let mut parameters = weights::from_bytes(&model.network, weights, &kind.name())?;
-        // The model of the configuration replaces that of the weights.
+        // The opponent model of the configuration replaces the one in the weights file.
         if let (Some(range), Some(opponent)) = (PolicyKind::opponent_range(&model), &opponent) {
             parameters[range].copy_from_slice(opponent.parameters());
         }
@@ -274,7 +275,8 @@ impl<A: Algorithm> Trainer for PolicyTrainer<A> {
         checkpoint: &Checkpoint,
         _: &AtomicBool,
     ) -> Result<Option<()>, CheckpointError> {
-        // No step changes the opponent model, so these are the parameters in its file.
+        // Training does not change the opponent model, so these are the parameters of its weights
+        // file.
         let opponent = self.state.opponent_parameters().map(<[f32]>::to_vec);
         let before = (self.state.learner.state(), self.state.iterations);
         self.state.resume(checkpoint)?;
@@ -349,7 +351,7 @@ impl Default for PpoTrainingConfig {
 }
 
 impl Algorithm for PpoTrainingConfig {
-    /// Parameters of the initial policy, which the KL penalty refers to.
+    /// Parameters of the initial policy, for the KL penalty.
     type Data = Option<Vec<f32>>;
     const KIND: &'static str = "ppo";
     const BOUNDS: BoundTable = &[
@@ -402,8 +404,8 @@ impl Algorithm for PpoTrainingConfig {
     }
 }
 
-/// Reads the parameters of the initial policy from the folder of a training; `None` if no KL penalty
-/// refers to them. `parse` reads those of a weights file.
+/// Reads the parameters of the initial policy from the folder of a training; `None` if there is no
+/// KL penalty. `parse` parses a weights file.
 ///
 /// # Errors
 /// One line, if the training has no initial weights, or they cannot be read.

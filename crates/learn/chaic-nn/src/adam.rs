@@ -16,7 +16,8 @@ pub struct AdamWConfig {
     pub epsilon: f32,
     /// Decoupled weight decay of convolution weights, relative to the learning rate.
     pub weight_decay: f32,
-    /// Maximum L2 norm of the whole gradient; longer gradients are scaled down to it.
+    /// Maximum L2 norm of the whole gradient. Gradients with a larger norm are scaled down to this
+    /// norm.
     #[serde(alias = "clip_norm")]
     pub max_grad_norm: f32,
 }

@@ -23,8 +23,8 @@ pub(crate) struct AttentionGrad {
 }
 
 impl Attention<'_> {
-    /// Calls `f` with the first row, the number of rows and the first channel of each group and
-    /// head, and with the offset of their weights.
+    /// Calls `f(first row, number of rows, first channel, offset of the weights)` for each group
+    /// and head.
     fn for_each_head(&self, mut f: impl FnMut(usize, usize, usize, usize)) {
         let head_channels = self.channels / self.n_heads;
         let (mut first_row, mut first_weight) = (0, 0);
@@ -37,13 +37,13 @@ impl Attention<'_> {
         }
     }
 
-    /// Returns the range of a row's channels in one head.
+    /// Returns the index range of the channels that one head reads in a row.
     fn head(&self, row: usize, first_channel: usize) -> std::ops::Range<usize> {
         let start = row * self.channels + first_channel;
         start..start + self.channels / self.n_heads
     }
 
-    /// Factor on the dot products.
+    /// Returns the factor of the dot products, 1 / sqrt(channels per head).
     fn scale(&self) -> f32 {
         1.0 / ((self.channels / self.n_heads) as f32).sqrt()
     }

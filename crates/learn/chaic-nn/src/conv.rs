@@ -33,7 +33,7 @@ impl Kernel {
         Shape { n: shape.n, height, width, channels }
     }
 
-    /// Returns the number of elements under the kernel.
+    /// Returns the number of input elements under the kernel: size * size * channels.
     pub fn patch_len(&self, channels: usize) -> usize {
         self.size * self.size * channels
     }
@@ -115,7 +115,7 @@ pub(crate) fn forward_packed(
     }
 }
 
-/// Computation of some rows of the convolution of one map.
+/// Computes some output rows of the convolution of one map.
 pub(crate) struct ForwardRows<'a> {
     /// One map.
     pub map: TensorView<'a>,
@@ -127,7 +127,7 @@ pub(crate) struct ForwardRows<'a> {
     pub out: &'a mut [f32],
     /// Output rows.
     pub rows: Range<usize>,
-    /// Buffer.
+    /// Buffer for the inputs of output columns at the left and right border.
     pub edges: &'a mut Vec<f32>,
 }
 
@@ -414,7 +414,8 @@ mod tests {
     #[test]
     fn convolutions_are_bit_identical_to_the_reference_at_every_width() {
         let mut rng = RngStream::new(1, "conv", 0);
-        // Numbers of channels for which kernel rows share a block, fill it, or span several.
+        // With these numbers of channels, kernel rows share a block, fill a block, or span several
+        // blocks.
         for (channels, n) in [(3, 5), (16, 48), (64, 20), (80, 50)] {
             for (size, stride) in [(1, 1), (3, 1), (3, 2), (5, 2), (5, 1), (1, 2)] {
                 for (height, width) in [(1, 1), (2, 3), (5, 21), (9, 16)] {

@@ -7,7 +7,8 @@ use pulp::{Arch, Simd, WithSimd};
 
 use crate::tensor::{Shape, TensorView};
 
-/// Divisor of the number of channels: whole vectors on every machine.
+/// The number of channels must be a multiple of this value, so that it fills whole vectors on every
+/// machine.
 pub const CHANNEL_MULTIPLE: usize = 16;
 
 /// Row of zeros, read above and below a map.
@@ -135,7 +136,7 @@ struct Forward<'a> {
     out: &'a mut [f32],
     /// Output rows that `out` holds.
     rows: Range<usize>,
-    /// One row.
+    /// One row of zeros.
     zeros: &'a [f32],
     /// True if the kernel is rotated by 180 degrees, as in the backward pass.
     is_flipped: bool,

@@ -133,15 +133,15 @@ pub(crate) fn add_neighbor_gradients(gradient: &[f32], length: usize, rows: &mut
     }
 }
 
-/// Returns, for each row of a sequence, its range and each range of the output of
-/// [`concat_neighbors`] that holds a copy of it.
+/// Returns, for each row of a sequence, the range of the row and the ranges of its copies in the
+/// output of [`concat_neighbors`].
 fn neighbor_ranges(
     length: usize,
     channels: usize,
 ) -> impl Iterator<Item = (Range<usize>, Range<usize>)> {
     let range = move |k: usize| k * channels..(k + 1) * channels;
     (0..length).flat_map(move |row| {
-        // The row is the next one of the row before, and the previous one of the row after.
+        // This row is the next row of its predecessor, and the previous row of its successor.
         let next_of = row.checked_sub(1).map(|before| 3 * before + 2);
         let previous_of = Some(3 * (row + 1)).filter(|_| row + 1 < length);
         let copies = [next_of, Some(3 * row + 1), previous_of].into_iter().flatten();

@@ -5,7 +5,8 @@ use std::ops::Range;
 
 use pulp::{Arch, Simd, WithSimd};
 
-/// Columns of the left matrix per block, so that a panel of the right matrix stays in the L1 cache.
+/// Columns of the left matrix per block. With this size, a panel of the right matrix stays in the
+/// L1 cache.
 const INNER_BLOCK: usize = 192;
 /// Rows of the left matrix that are packed together.
 const ROW_BLOCK: usize = 48;
@@ -13,7 +14,7 @@ const ROW_BLOCK: usize = 48;
 /// Strided view of a matrix: element (i, j) is `data[i * row_stride + j * column_stride]`.
 #[derive(Clone, Copy, Debug)]
 pub struct Matrix<'a> {
-    /// Elements; strides may skip some.
+    /// Elements; strides may skip some elements.
     pub data: &'a [f32],
     /// Number of rows.
     pub rows: usize,
@@ -143,14 +144,15 @@ fn split_in_blocks(rows: usize, group_len: usize) -> impl Iterator<Item = Range<
     })
 }
 
-/// Returns the number of vectors in a row of a panel. It leaves registers for one panel row and one
-/// left element beside the accumulators: of 16 registers 12 hold sums, of 32 (AVX-512) up to 24.
-/// With 16 registers, 4 rows of 3 vectors would need all of them; they were half as fast on EPYC.
+/// Returns the number of SIMD vectors in a row of a panel. One panel row and one left element also
+/// need registers: of 16 registers 12 hold sums, of 32 registers (AVX-512) up to 24. With 16
+/// registers, tiles of 4 rows and 3 vectors would need all registers; they were half as fast on an
+/// EPYC processor.
 #[inline(always)]
 fn panel_vectors(lanes: usize, columns: usize) -> usize {
     let padded = |vectors: usize| columns.next_multiple_of(vectors * lanes);
     match lanes {
-        // Panels of two vectors if a large part of panels of three would be padding.
+        // Panels have two vectors if with three vectors a large part would be padding.
         16.. if 9 * padded(2) <= 8 * padded(3) => 2,
         16.. => 3,
         _ => 2,
@@ -259,7 +261,7 @@ pub(crate) trait Left<const ROWS: usize> {
     fn at(&self, k: usize) -> [f32; ROWS];
 }
 
-/// Rows at their original place.
+/// Rows that are read in place, without packing.
 pub(crate) struct Rows<'a, const ROWS: usize>(pub [&'a [f32]; ROWS]);
 
 impl<const ROWS: usize> Left<ROWS> for Rows<'_, ROWS> {

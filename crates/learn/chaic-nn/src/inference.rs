@@ -96,7 +96,7 @@ impl Inference {
             for layer in segment.clone().filter(|layer| self.is_kept[*layer]) {
                 self.activations[layer].reshape(self.network.shape_of(Node(layer), input));
             }
-            // An even height: an upsampled strip starts at a full input row.
+            // The height of a strip is even, so that an upsampled strip starts at a full input row.
             let strip = (STRIP_PIXELS / shape.width).next_multiple_of(2).max(2);
             for top in (0..shape.height).step_by(strip) {
                 let rows = top..(top + strip).min(shape.height);
@@ -177,7 +177,8 @@ impl Inference {
     }
 }
 
-/// Packs the weights of dense convolutions, by layer; the matrices of other layers are empty.
+/// Packs the weights of dense convolutions. Returns one matrix per layer; the matrices of other
+/// layers are empty.
 pub(crate) fn pack_weights(network: &Network, parameters: &[f32], arch: Arch) -> Vec<PackedMatrix> {
     let mut packed = vec![PackedMatrix::default(); network.layers.len()];
     for (layer, packed) in network.layers.iter().zip(&mut packed) {
@@ -189,7 +190,8 @@ pub(crate) fn pack_weights(network: &Network, parameters: &[f32], arch: Arch) ->
     packed
 }
 
-/// Returns ranges of layers that are computed strip by strip together, and which layers are kept.
+/// Returns segments, which are ranges of layers that are computed together strip by strip, and for
+/// each layer whether its output is kept.
 fn segments(network: &Network) -> (Vec<Range<usize>>, Vec<bool>) {
     let layers = &network.layers;
     let mut is_kept = vec![false; layers.len()];

@@ -20,11 +20,12 @@ pub struct Parameter {
     pub shape: Vec<usize>,
     /// Range in the list of all parameters.
     pub range: Range<usize>,
-    /// Weight decay applies to convolution weights only.
+    /// True if weight decay applies: for convolution weights only.
     pub has_weight_decay: bool,
 }
 
-/// Layer, which reads earlier layers only. Kernels keep the center of a map in place.
+/// Layer of a network; it reads outputs of earlier layers only. Convolutions have zero padding of
+/// half the kernel size.
 #[derive(Clone, Debug)]
 pub(crate) enum Layer {
     /// Input, by its index.
@@ -70,7 +71,7 @@ impl Layer {
     }
 }
 
-/// Size of a layer's output relative to the input.
+/// Size of a layer's output relative to the network's input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Size {
     channels: usize,
@@ -248,7 +249,7 @@ impl Network {
 
     /// Adds the concatenation of the channels of the previous, the same and the next row; the first
     /// and last row have zeros for the missing one. Rows are maps of one pixel; `length` consecutive
-    /// ones are a sequence. With a pointwise convolution it is a convolution of size 3 over time.
+    /// rows form a sequence. With a pointwise convolution it is a convolution of size 3 over time.
     pub fn concat_neighbors(&mut self, from: Node, length: usize) -> Node {
         let size = self.sizes[from.0];
         let channels = 3 * size.channels;
@@ -276,7 +277,7 @@ impl Network {
         &self.outputs
     }
 
-    /// Returns the maximum stride. Width and height of the input must be multiples of it.
+    /// Returns the maximum stride. Width and height of the input must be multiples of this stride.
     pub fn stride(&self) -> usize {
         self.sizes.iter().map(|size| size.stride).max().unwrap_or(1)
     }

@@ -6,8 +6,8 @@ use pulp::{Simd, WithSimd};
 
 /// Added to variances.
 const EPSILON: f32 = 1e-5;
-/// Number of lanes of sums over channels. Lanes are added in a fixed order, so results do not
-/// depend on the vector width. It divides the number of channels.
+/// Number of partial sums over channels. They are added in a fixed order, so results do not depend
+/// on the vector width. The number of channels must be a multiple of this value.
 pub(crate) const LANES: usize = 16;
 /// Number of pixels that are normalized together, to hide the latency of square roots.
 const PIXELS: usize = 16;
@@ -20,7 +20,7 @@ type PerPixel = [f32; PIXELS];
 #[inline(always)]
 fn sum<S: Simd>(simd: S, n_vectors: usize, mut value: impl FnMut(usize) -> S::f32s) -> f32 {
     let mut n = LANES / S::F32_LANES;
-    // Enough for vectors of one element.
+    // There are enough sums even for vectors of one element.
     let mut sums = [simd.splat_f32s(0.0); LANES];
     for first in (0..n_vectors).step_by(n) {
         for (j, sum) in sums.iter_mut().enumerate().take(n) {
@@ -72,7 +72,7 @@ fn statistics<S: Simd>(simd: S, map: &[f32], channels: usize) -> (PerPixel, PerP
     (means, inv_std_devs)
 }
 
-/// Normalizes maps of shape [pixels, channels] into `out`; values below `floor` are raised to it.
+/// Normalizes maps of shape [pixels, channels] into `out`; values below `floor` are set to `floor`.
 pub(crate) struct Forward<'a> {
     pub map: &'a [f32],
     pub scale: &'a [f32],

@@ -30,7 +30,8 @@ pub struct Pass {
     zeros: Zeros,
     /// Gradient of one map.
     grad_map: Vec<f32>,
-    /// Numbers of consecutive rows that attend to each other; empty if all do.
+    /// Numbers of consecutive rows that attend to each other; empty if all rows attend to each
+    /// other.
     groups: Vec<usize>,
     /// Weights of each attention layer.
     attention_weights: Vec<Vec<f32>>,
@@ -57,8 +58,8 @@ impl Pass {
     }
 
     /// Creates the buffers for forward passes that all use these parameters. Weights of dense
-    /// convolutions are packed once, and copies share them. Calls with other parameters would still
-    /// use them.
+    /// convolutions are packed once, and copies share them. Later calls with other parameters still
+    /// use the packed weights.
     pub fn with_constant_parameters(network: &Network, parameters: &[f32], arch: Arch) -> Pass {
         let packed: Arc<[PackedMatrix]> = pack_weights(network, parameters, arch).into();
         Pass { packed, ..Pass::new(network, arch) }

@@ -72,7 +72,7 @@ pub fn to_bytes(
 pub fn to_bf16(network: &Network, bytes: &[u8], kind: &str) -> Result<Vec<u8>, WeightsError> {
     let parameters = from_bytes(network, bytes, kind)?;
     let bf16 = |x: f32| {
-        // Half of the last kept place is added; ties round to even.
+        // Adds half of the last kept bit before truncation; ties round to even.
         let bits = x.to_bits();
         ((bits + 0x7fff + (bits >> 16 & 1)) >> 16) as u16
     };
@@ -94,7 +94,7 @@ fn encode_as(network: &Network, bytes: Vec<u8>, dtype: Dtype, kind: &str) -> Vec
         let view = TensorView::new(dtype, p.shape.clone(), data);
         (p.name.clone(), view.expect("the length matches the shape"))
     };
-    // A single entry, since a hash map with several has no fixed order.
+    // The metadata has a single entry, because a hash map with several entries has no fixed order.
     let metadata = HashMap::from([(KIND.to_owned(), kind.to_owned())]);
     let views = network.parameters().iter().map(view);
     serialize(views, Some(metadata)).expect("names and shapes can be encoded")

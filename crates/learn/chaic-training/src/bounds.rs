@@ -52,12 +52,12 @@ pub const MAX_STEPS: u64 = 1_000_000_000;
 /// Bounds of the number of training steps.
 pub const STEPS: Bound = integer(1, MAX_STEPS as i64);
 /// Bounds of a learning rate. AdamW changes each parameter by about the learning rate per step, and
-/// parameters are about 1.
+/// the magnitude of parameters is about 1.
 pub const LEARNING_RATE: Bound = real(0.0, 1.0);
 /// Bounds of the number of shards. Each shard is a thread with a gradient buffer.
 pub const SHARDS: Bound = integer(1, 256);
-/// Bounds of [`AdamWConfig`](chaic_nn::AdamWConfig). The betas stay below 1, where bias correction
-/// divides by 0.
+/// Bounds of [`AdamWConfig`](chaic_nn::AdamWConfig). The betas must be below 1: at 1, bias
+/// correction divides by 0.
 pub const ADAM: Bound = Bound::Table(&[
     ("beta1", real(0.0, 0.9999)),
     ("beta2", real(0.0, 0.99999)),

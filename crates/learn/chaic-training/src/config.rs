@@ -9,7 +9,8 @@ use toml::Table;
 use crate::bounds;
 use crate::trainer::{Trainer, TrainingError};
 
-/// Maximum size of a configuration file, bytes: a thousand times that of the longest one.
+/// Maximum size of a configuration file, bytes: a thousand times the size of the longest
+/// configuration.
 const MAX_BYTES: u64 = 1 << 22;
 
 /// Reads a configuration file that a user named; missing keys get their defaults.
@@ -48,7 +49,7 @@ pub fn read_config_with<T: Trainer>(
         let assigned = parse_assignment(assignment).map_err(|problem| invalid(&problem))?;
         table = assign::<T>(&table, assigned);
         if let Err(problem) = parse::<T::Config>(&table.to_string()) {
-            // Bounds name the key as well.
+            // Bounds are checked first, because their errors name the key.
             bounds::check(&table, T::BOUNDS).map_err(TrainingError::InvalidConfig)?;
             return Err(invalid(without_line(&problem)));
         }
@@ -67,8 +68,8 @@ fn parse_assignment(text: &str) -> Result<Table, String> {
     })
 }
 
-/// Returns the complete table of a configuration with one assignment merged into it. Old names of
-/// the assignment are replaced, since the table holds their current names.
+/// Returns the complete table of a configuration with one assignment merged into it. Old names in
+/// the assignment are replaced, because the table has current names only.
 fn assign<T: Trainer>(table: &Table, mut assignment: Table) -> Table {
     loop {
         let mut merged = table.clone();
@@ -88,7 +89,7 @@ fn duplicate_field(message: &str) -> Option<&str> {
     rest.split_once('`').map(|(name, _)| name)
 }
 
-/// Renames the outermost key of an assignment that `table` lacks to `current`, which it has.
+/// Renames the outermost key of an assignment that is not in `table` to `current`, which is.
 fn with_current_key(table: &Table, assignment: &Table, current: &str) -> Option<Table> {
     let (key, value) = assignment.iter().next().filter(|_| assignment.len() == 1)?;
     let (key, value) = match (table.get(key), value) {
@@ -156,8 +157,9 @@ fn parse_values<T: Trainer>(text: &str) -> Result<T::Config, String> {
     Ok(with_nested_defaults::<T>(table, parse(text)?))
 }
 
-/// Gives the missing keys of inner tables the defaults of this training. Those of the table's own type
-/// may differ: `[ppo]` alone has the defaults of Stable-Baselines3. `config` is the parsed `table`.
+/// Gives the missing keys of inner tables the defaults of this training. The defaults of the table's
+/// own type may differ: `[ppo]` alone has the defaults of Stable-Baselines3. `config` is the parsed
+/// `table`.
 fn with_nested_defaults<T: Trainer>(mut table: Table, mut config: T::Config) -> T::Config {
     let defaults = Table::try_from(T::Config::default()).expect("defaults serialize to TOML");
     for missing in missing_values(&table, &defaults) {

@@ -15,10 +15,10 @@ use crate::trainer::Trainer;
 
 /// Maximum size of a checkpoint in which every bit is flipped, bits.
 const EVERY_BIT: usize = 20_000;
-/// Number of bits that are flipped in larger checkpoints, besides those of the first bytes: as many as
-/// [`SAMPLED_BYTES`] allow.
+/// Number of bits that are flipped in larger checkpoints, in addition to bits of the first bytes.
+/// [`SAMPLED_BYTES`] selects a number in this range.
 const SAMPLED_BITS: [usize; 2] = [24, 160];
-/// Bytes that all of these flips together should read.
+/// Total number of bytes that these flips may read.
 const SAMPLED_BYTES: usize = 1 << 30;
 /// Number of first bytes of larger checkpoints in which every [`HEAD_STRIDE`]-th bit is flipped:
 /// head, identity and first section.
@@ -68,7 +68,7 @@ fn sampled_bits(n_bits: usize) -> Vec<usize> {
 }
 
 /// Calls `check` for checkpoints that differ from a valid one by a value, a length or a section, with
-/// a description of each. One exists at a time, since checkpoints are large.
+/// a description of each. Only one copy exists at a time, because checkpoints are large.
 fn for_each_alteration(valid: &Checkpoint, mut check: impl FnMut(&str, &Checkpoint)) {
     let mut altered = valid.clone();
     let mut add = |description: String, name: &str, section: Option<Section>| {
@@ -85,7 +85,7 @@ fn for_each_alteration(valid: &Checkpoint, mut check: impl FnMut(&str, &Checkpoi
         add("an appended value".to_owned(), name, Some(longer(section)));
         let n = len(section);
         if n > 0 {
-            // Each value at one place, since checkpoints are large.
+            // Each value is tried at one place only, because checkpoints are large.
             for (k, value) in hostile_values(section).into_iter().enumerate() {
                 let at = [0, n / 2, n - 1][k % 3];
                 add(format!("{value:?} at {at}"), name, Some(with_value(section, at, value)));
@@ -139,7 +139,7 @@ fn hostile_values(section: &Section) -> Vec<SectionValue> {
         Section::Doubles(_) => {
             [f64::NAN, f64::INFINITY, -1.0, 2.0].map(SectionValue::Double).to_vec()
         }
-        // The trainer may have written any byte.
+        // A trainer may write any byte, so no byte is hostile.
         Section::Bytes(_) => Vec::new(),
     }
 }

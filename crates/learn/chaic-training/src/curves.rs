@@ -35,7 +35,7 @@ pub struct CurveRecord {
     /// Phase in which the metrics were measured.
     #[serde(alias = "of")]
     pub phase: Phase,
-    /// Number of steps taken before.
+    /// Number of steps taken before this record.
     pub step: u64,
     /// Means over the steps since the last training record, or results of a validation.
     #[serde(flatten, deserialize_with = "read_metrics")]

@@ -7,7 +7,8 @@ use chaic_nn::{AdamW, AdamWConfig, Network, Pass};
 
 use crate::checkpoint::{Checkpoint, CheckpointError};
 
-/// Weight of the new parameters in the exponential moving average, late in a training.
+/// Weight of the new parameters in the exponential moving average, late in a training. Early in a
+/// training the weight is larger.
 const EMA_RATE: f32 = 0.002;
 
 /// Sections of a checkpoint.
@@ -17,7 +18,7 @@ const EXP_AVG: &str = "adam.exp_avg";
 const EXP_AVG_SQ: &str = "adam.exp_avg_sq";
 const OPTIMIZER_STEPS: &str = "adam.steps";
 const BETA_POWERS: &str = "adam.beta_powers";
-/// Maximum number of optimizer steps in a checkpoint: more than years of training, and far from
+/// Maximum number of optimizer steps in a checkpoint: more than any training reaches, and far from
 /// overflow.
 const MAX_OPTIMIZER_STEPS: u64 = 1 << 48;
 
@@ -25,8 +26,8 @@ const MAX_OPTIMIZER_STEPS: u64 = 1 << 48;
 pub struct Learner {
     /// Parameters of the network.
     pub parameters: Vec<f32>,
-    /// Exponential moving average of the parameters; the perception and opponent networks export
-    /// it.
+    /// Exponential moving average of the parameters; trainers of perception and opponent models
+    /// export it.
     pub ema_parameters: Vec<f32>,
     /// Optimizer.
     pub adam: AdamW,
@@ -108,8 +109,8 @@ impl Learner {
     /// changes.
     ///
     /// # Errors
-    /// [`CheckpointError::Section`] if a section is missing, has another length, or holds values that
-    /// no optimizer reaches.
+    /// [`CheckpointError::Section`] if a section is missing, has another length, or holds values
+    /// that no optimizer can reach.
     pub fn load(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
         self.load_as("", checkpoint)
     }

@@ -50,8 +50,8 @@ pub struct TrainingRun<T> {
     _lock: FolderLock,
 }
 
-/// Returns the content of a checkpoint file, with the metrics of the steps since the last record. It
-/// records no settings, as those of earlier builds.
+/// Returns the content of a checkpoint file, with the metrics of the steps since the last record.
+/// Like checkpoints of earlier builds, it records no settings.
 ///
 /// # Errors
 /// If a value is not finite.
@@ -99,7 +99,7 @@ fn changed_since<T: Trainer>(
     Ok(changed_setting(&recorded, current, "the training began"))
 }
 
-/// Checks that the training data is that with which the training began.
+/// Checks that the training data has not changed since the start of the training.
 fn check_input<T: Trainer>(trainer: &T, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
     // A checkpoint of an earlier version has no digest.
     let expected = input_section(trainer);
@@ -249,7 +249,7 @@ impl<T: Trainer> TrainingRun<T> {
         let checkpoint_error = |problem| TrainingError::Checkpoint { path: path.clone(), problem };
         let settings = settings::values(&config, &T::fixed_keys());
         if let Some(bytes) = &bytes {
-            // Other settings may have other data or another network, so this comes first.
+            // Changed settings may imply other data or another network, so this check comes first.
             let problem = changed_since::<T>(bytes, &settings).map_err(checkpoint_error)?;
             if let Some(problem) = problem {
                 return Err(TrainingError::Config { path: folder.join(CONFIG), problem });
@@ -349,8 +349,8 @@ impl<T: Trainer> TrainingRun<T> {
         Ok(true)
     }
 
-    /// Validates, records the metrics, and writes the weights, unless earlier ones have a score and
-    /// these have no higher one; returns whether it was completed.
+    /// Validates, records the metrics, and writes the weights. Weights without a higher score do
+    /// not replace scored weights. Returns whether the validation was completed.
     fn validate(
         &mut self,
         stop: &AtomicBool,
@@ -367,7 +367,8 @@ impl<T: Trainer> TrainingRun<T> {
         if is_best {
             write_atomically(&self.folder.join(T::WEIGHTS), &weights)?;
         }
-        // Resuming takes the last line as proof of its validation, so the weights come first.
+        // Resuming treats the last line of the curves as proof that its validation is complete, so
+        // the weights are written first.
         self.record(&CurveRecord { phase: Phase::Validation, step, metrics }, report)?;
         if is_best {
             self.best_score = score;
@@ -448,8 +449,8 @@ fn start_locked<T: Trainer>(
     Ok(Some(trainer))
 }
 
-/// Writes the checkpoint of a training before its first step. Curves without a checkpoint mean that it
-/// is lost.
+/// Writes the checkpoint of a training before its first step. If curves exist without a checkpoint,
+/// the checkpoint is lost.
 fn write_initial_checkpoint<T: Trainer>(
     trainer: &T,
     settings: &Settings,

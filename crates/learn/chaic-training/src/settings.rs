@@ -13,8 +13,8 @@ const SETTINGS: &str = "run.settings";
 /// Values of settings as text, by key.
 pub type Settings = BTreeMap<String, String>;
 
-/// Returns a message about the first setting whose value differs from the recorded one; `event` is when
-/// it was recorded. A key that only one side has is of another build.
+/// Returns a message about the first setting whose value differs from the recorded one; `event`
+/// describes when it was recorded. A key on one side only comes from another build and is ignored.
 pub fn changed_setting(recorded: &Settings, current: &Settings, event: &str) -> Option<String> {
     recorded.iter().find_map(|(key, before)| {
         let now = current.get(key).filter(|now| *now != before)?;
@@ -62,7 +62,7 @@ pub(crate) fn record(settings: &Settings, checkpoint: &mut Checkpoint) {
     }
 }
 
-/// Returns the settings in a checkpoint. Those of earlier builds have none.
+/// Returns the settings in a checkpoint. Checkpoints of earlier builds have none.
 pub(crate) fn recorded(checkpoint: &Checkpoint) -> Result<Settings, CheckpointError> {
     if !checkpoint.sections.contains_key(SETTINGS) {
         return Ok(Settings::new());
@@ -92,7 +92,7 @@ mod tests {
         ]);
         let found = values(&table, &["names", "t", "v.y"]);
         assert_eq!(found, expected);
-        // As a double it has 16 digits.
+        // As a double, the value would have 16 digits.
         let single = BTreeMap::from([("gamma", 0.9998_f32)]);
         assert_eq!(values(&single, &["gamma"]), settings(&[("gamma", "0.9998")]));
         let mut checkpoint = Checkpoint::default();

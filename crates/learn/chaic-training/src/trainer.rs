@@ -16,7 +16,7 @@ use crate::curves::Metrics;
 
 /// Training algorithm that [`TrainingRun`](crate::TrainingRun) runs in a folder.
 ///
-/// Long operations get a `stop` flag and check it at least once a second. Once it is raised, they
+/// Long operations get a `stop` flag and check it at least once a second. If the flag is set, they
 /// return `None` and leave the training unchanged.
 pub trait Trainer: Sized {
     /// Configuration, stored as TOML.
@@ -33,8 +33,9 @@ pub trait Trainer: Sized {
     const CHECKPOINT_STEPS: u64 = 250;
     /// Number of steps between two validations.
     const VALIDATION_STEPS: u64 = 1000;
-    /// Validation metric of which the weights with the highest value are kept; `None` to keep those
-    /// of the last validation. Weights without a value are kept until a validation has one.
+    /// Validation metric that selects the kept weights: those with the highest value. With `None`,
+    /// the weights of the last validation are kept. Weights without a value are kept until a
+    /// validation has a value.
     const SCORE: Option<&'static str> = None;
     /// Key of the configuration that names the data of [`Trainer::input_digest`]; empty if there is none.
     const INPUT_KEY: &'static str = "";
@@ -48,7 +49,7 @@ pub trait Trainer: Sized {
     /// `folder`.
     ///
     /// # Errors
-    /// If data cannot be written or read, or is of no use. A failed file operation is
+    /// If data cannot be written or read, or cannot be used. A failed file operation is
     /// [`TrainingError::File`].
     fn new(
         config: &Self::Config,
@@ -57,8 +58,8 @@ pub trait Trainer: Sized {
         stop: &AtomicBool,
     ) -> Result<Option<Self>, TrainingError>;
 
-    /// Checks what bounds of single numbers cannot express, and the input files that the
-    /// configuration names.
+    /// Checks constraints that bounds of single numbers cannot express, and the input files that
+    /// the configuration names.
     ///
     /// # Errors
     /// One line that describes the problem.
@@ -70,9 +71,9 @@ pub trait Trainer: Sized {
     /// If the file does not fit the network, or a value is not finite.
     fn read_weights(config: &Self::Config, weights: &[u8]) -> Result<Vec<f32>, WeightsError>;
 
-    /// Returns the keys of the configuration on which the network, data of the folder, recorded positions or
-    /// the best score depend, such as `rollout.tasks`. A training is resumed only with the same values. Each
-    /// key has a value in every configuration; that of a table stands for all of its keys.
+    /// Returns the keys that may not change between start and resume, such as `rollout.tasks`. The network,
+    /// the data in the folder, recorded positions or the best score depend on them. Each key has a value in
+    /// every configuration; the key of a table stands for all keys of the table.
     fn fixed_keys() -> Vec<&'static str> {
         Vec::new()
     }

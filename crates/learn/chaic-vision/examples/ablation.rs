@@ -83,7 +83,7 @@ fn without_redrawn_masks(mut detector: TrainedDetector) -> Option<TrainedDetecto
     let stage = detector.second_stage.as_mut()?;
     let mut parameters = stage.network.network.parameters().iter();
     let biases = parameters.find(|parameter| parameter.name == "qualities.bias")?;
-    // A logit of -100 is a quality of 0.
+    // A logit of -100 means a quality of 0.
     stage.parameters[biases.range.clone()][1] = -100.0;
     Some(detector)
 }

@@ -19,8 +19,8 @@ pub struct GroundTruthInstance {
     pub area: u32,
 }
 
-/// Range of areas that are evaluated, pixels. Instances outside of it are ignored: neither missed
-/// nor wrong.
+/// Range of areas of evaluated instances, pixels. Instances outside this range are ignored: they
+/// count neither as missed nor as wrong.
 pub type AreaRange = RangeInclusive<u32>;
 
 /// Detection in an image, with its overlaps with the annotated instances.
@@ -45,7 +45,8 @@ pub struct EvaluatedImage {
     pub detections: Vec<ScoredDetection>,
 }
 
-/// Average precision of one class at one IoU threshold; `None` if no instance of it is evaluated.
+/// Returns the average precision of one class at one IoU threshold; `None` if no instance of the
+/// class is evaluated.
 fn class_precision(
     images: &[EvaluatedImage],
     label: u8,
@@ -57,7 +58,7 @@ fn class_precision(
     if n_evaluated == 0 {
         return None;
     }
-    // Score and correctness of the detections that count.
+    // Score and correctness of the detections that are not ignored.
     let mut scored: Vec<(f32, bool)> = Vec::new();
     for image in images {
         match_detections(image, label, iou_threshold, areas, &mut scored);
@@ -68,7 +69,7 @@ fn class_precision(
         correct += usize::from(*is_correct);
         curve.push((correct as f64 / n_evaluated as f64, correct as f64 / (n + 1) as f64));
     }
-    // Interpolated precision: the maximum at this recall or a higher one.
+    // Interpolated precision: the maximum precision at this or a higher recall.
     let mut best = 0.0_f64;
     for (_, precision) in curve.iter_mut().rev() {
         best = best.max(*precision);

@@ -1,13 +1,13 @@
 //! Score calibration: logistic regression of the probability that a detection is correct, fitted on
-//! views of helpers. Uncalibrated probabilities are too high, since small objects have large
-//! weights in the loss.
+//! views of helpers. Uncalibrated probabilities are too high, because pixels of small objects have
+//! large weights in the loss.
 
 use serde::{Deserialize, Serialize};
 
 use crate::loss::{ln, sigmoid};
 
-/// Number of predictors: 1, log odds of the mean probability, log number of pixels, log distance in
-/// meters.
+/// Number of predictors: the constant 1, log odds of the mean probability, log of the number of
+/// pixels, log of the distance in meters.
 pub const N_PREDICTORS: usize = 4;
 
 /// Coefficients of the regression.
@@ -98,14 +98,14 @@ fn solve(
     b
 }
 
-/// Expected calibration error over ten bins: mean difference between probability and accuracy,
-/// weighted by the number of samples of each bin.
+/// Returns the expected calibration error over ten bins: the mean absolute difference between
+/// probability and accuracy, weighted by the number of samples of each bin.
 pub fn calibration_error(scored: &[(f32, bool)]) -> f64 {
     let weighted = scored.iter().map(|(p, is_correct)| (*p, *is_correct, 1.0));
     weighted_calibration_error(&weighted.collect::<Vec<_>>())
 }
 
-/// Expected calibration error of samples with a weight each; 0 without samples.
+/// Returns the expected calibration error of weighted samples; 0 without samples.
 pub fn weighted_calibration_error(scored: &[(f32, bool, f64)]) -> f64 {
     const BINS: usize = 10;
     let mut bins = [(0.0f64, 0.0f64); BINS];

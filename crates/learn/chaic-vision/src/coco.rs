@@ -30,7 +30,8 @@ pub const DEPTH: &str = "depth";
 /// Quantization step of stored depth, meters. Depth is clamped to 65.535 m.
 pub const DEPTH_STEP_M: f32 = 0.001;
 
-/// Mask as lengths of runs of pixels outside and inside, in column-major order.
+/// Run-length encoded mask: alternating lengths of runs outside and inside the mask, in
+/// column-major order.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct RleMask {
     /// Height and width.
@@ -45,7 +46,7 @@ impl RleMask {
         let mut by_column: Vec<u32> =
             pixels.iter().map(|k| (k % width) * height + k / width).collect();
         by_column.sort_unstable();
-        // Ends of runs; the first run is outside.
+        // Ends of runs; the first run is outside the mask.
         let mut ends: Vec<u32> = Vec::new();
         for k in by_column {
             match ends.last_mut() {
@@ -171,7 +172,7 @@ pub fn annotate(image_id: usize, view: &LabeledView) -> AnnotatedView {
     AnnotatedView { image, annotations: visible.map(annotation).collect() }
 }
 
-/// Converts detections in a view to COCO results, one per name of an instance.
+/// Converts detections in a view to COCO results, one per candidate label of an instance.
 pub fn results(image_id: usize, view: &LabeledView, found: &[Instance]) -> Vec<CocoResult> {
     let size = [view.camera.width, view.camera.height];
     let results_of = |instance: &Instance| {
@@ -251,13 +252,13 @@ fn write_images(folder: &Path, view: &LabeledView, image: &ImageRecord) -> Resul
     Ok(())
 }
 
-/// Views that are drawn between two calls of `should_continue`: about a second of work for one
-/// thread.
+/// Number of views that are rendered between two calls of `should_continue`: about a second of work
+/// for one thread.
 const VIEWS_PER_ROUND: usize = 16;
 
 /// Writes a data set of the first `n_views` views into a folder: images, depth, annotations and
 /// statistics. `should_continue` is called with the number of finished views; if it returns
-/// `false`, the data set of these views is completed and collection stops.
+/// `false`, collection stops, and the data set contains the finished views.
 ///
 /// # Errors
 /// If a file cannot be written.

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::features::N_FEATURES;
 use crate::labels::n_labels;
 
-/// Pixels of the image per pixel of the head, in both directions.
+/// Image pixels per output pixel of the head, along each axis.
 pub const STRIDE: usize = 2;
 /// Channels of the decoder, and of the encoder at half the resolution.
 const WIDTH: usize = 48;
@@ -92,7 +92,7 @@ impl Detector {
         let mut decoded = None;
         for (level, node) in levels.into_iter().enumerate().rev() {
             let name = format!("up{level}");
-            // The stem has the decoder's width already.
+            // The output of the stem already has the decoder's width.
             let mut level_features = match level {
                 0 => node,
                 _ => net.conv(&name, node, Kernel::POINTWISE, WIDTH),

@@ -8,7 +8,8 @@ use crate::average_precision::{AreaRange, EvaluatedImage, GroundTruthInstance, S
 pub const REPORT_SCORE: f32 = 0.5;
 /// Minimum IoU of a correct mask.
 const FOREGROUND_IOU: f64 = 0.5;
-/// Minimum IoU of detections that are related to an instance.
+/// Minimum IoU at which a detection of the same class belongs to an instance, as a poor or merged
+/// mask.
 const BACKGROUND_IOU: f64 = 0.1;
 
 /// Number of evaluated instances and detections by outcome.
@@ -21,14 +22,15 @@ pub struct ErrorBreakdown {
     pub poor_mask: u32,
     /// Instances that were detected as another class.
     pub wrong_class: u32,
-    /// Instances that share one detection with another instance of their class.
+    /// Instances whose best detection also covers more than half of another instance of their
+    /// class.
     pub merged: u32,
-    /// Instances without any detection.
+    /// Instances that no detection covers well enough for another outcome.
     pub missed: u32,
-    /// Detections that cover a part of an instance with a better detection.
+    /// Further detections: more than half of their pixels lie on an instance of their class.
     #[serde(rename = "split")]
     pub duplicate: u32,
-    /// Detections without an instance of their class.
+    /// Detections of which at most half of the pixels lie on an instance of their class.
     #[serde(rename = "nothing_there")]
     pub background: u32,
 }
@@ -38,7 +40,7 @@ fn overlap(truth: &GroundTruthInstance, detection: &ScoredDetection, shared: u32
 }
 
 impl ErrorBreakdown {
-    /// Sums up all images; `areas` are the evaluated areas.
+    /// Counts the outcomes over all images; `areas` is the range of evaluated areas, pixels.
     pub fn new(images: &[EvaluatedImage], areas: &AreaRange) -> ErrorBreakdown {
         let mut sum = ErrorBreakdown::default();
         images.iter().for_each(|image| sum.add(image, areas));

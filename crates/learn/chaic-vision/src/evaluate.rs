@@ -23,7 +23,7 @@ pub const MIN_AREA_PX: u32 = 100;
 const EVALUATED_AREAS: AreaRange = MIN_AREA_PX..=u32::MAX;
 
 /// Computes the overlaps between the instances of a view and the detections, with one detection per
-/// name of an instance.
+/// candidate label of a detected instance.
 pub fn compare(view: &LabeledView, detections: &[Instance]) -> EvaluatedImage {
     let mut areas = vec![0u32; view.labels.len()];
     for id in &view.ids {

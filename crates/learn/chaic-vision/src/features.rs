@@ -26,7 +26,7 @@ impl ImageCrop {
 /// [height, width, 3]) and depth (meters, shape [height, width]) of the whole image.
 ///
 /// # Panics
-/// If the crop or the camera's size do not fit the images.
+/// If the crop or the camera's image size does not fit the images.
 pub fn features(rgb: &[u8], depth_m: &[f32], camera: &Camera, crop: ImageCrop, out: &mut [f32]) {
     let width = camera.width as usize;
     let [columns, rows] = crop.size;
@@ -43,7 +43,8 @@ pub fn features(rgb: &[u8], depth_m: &[f32], camera: &Camera, crop: ImageCrop, o
         inverse_depths.extend(depths.iter().map(|depth| 1.0 / valid_depth(*depth)));
     }
     let inverse_depths_of = |row: usize| &inverse_depths[(row - top) * (right - left)..];
-    // Offset of a column from the optical axis in pixels, and its part of the height above the eye.
+    // Offset of each column from the optical axis in pixels, and its contribution to the height
+    // above the eye.
     let across: Vec<(f32, f32)> = (crop.origin[0]..crop.origin[0] + columns)
         .map(|column| {
             let u = column as f32 + 0.5 - 0.5 * width as f32;
@@ -93,7 +94,7 @@ pub fn features(rgb: &[u8], depth_m: &[f32], camera: &Camera, crop: ImageCrop, o
 
 /// Clamps invalid depth to the far plane, meters.
 fn valid_depth(depth_m: f32) -> f32 {
-    /// Half of [`Camera::NEAR_M`].
+    /// Minimum valid depth, meters: half of [`Camera::NEAR_M`].
     const MIN_M: f32 = 0.05;
     if (MIN_M..=Camera::FAR_M).contains(&depth_m) { depth_m } else { Camera::FAR_M }
 }

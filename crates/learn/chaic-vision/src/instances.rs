@@ -1,4 +1,5 @@
-//! Grouping of pixels to instances: connected pixels of one label that vote for one center.
+//! Grouping of pixels into instances: connected pixels with one label that predict the same object
+//! center (center votes).
 
 mod join;
 
@@ -37,12 +38,12 @@ impl Instance {
     }
 }
 
-/// Drops pixels that are farther from the center of their instance than the object reaches: those that
-/// show the background through a basket or a shelf. A structure of panels may be of any size.
+/// Drops pixels that are too far from the center of their instance, because they show the background
+/// through a basket or a shelf. A structure of panels may be of any size.
 pub(crate) fn remove_background(instance: &mut Instance, depth_m: &[f32], camera: &Camera) {
     /// Maximum distance from the center, relative to the diagonal of the class. The center of the
-    /// visible part is not that of the object, and some objects are larger than their class. With
-    /// both constants mAP@50 stays the same, and mAP rises by 0.005 (150 views).
+    /// visible part differs from the center of the object, and some objects are larger than their
+    /// class. With both constants mAP@50 stays the same, and mAP rises by 0.005 (150 views).
     const MAX_DIAGONALS: f32 = 0.75;
     /// Tolerance of that distance, meters.
     const TOLERANCE_M: f32 = 0.15;
@@ -87,8 +88,8 @@ pub struct InstanceConfig {
     pub relabel_extents: f32,
     /// Minimum number of pixels of an instance at the network's resolution.
     pub min_pixels: usize,
-    /// Neighboring pixels of different labels are connected as well. The label with the largest sum
-    /// of probabilities is that of the instance.
+    /// True if neighboring pixels of different labels are connected as well. The instance then gets
+    /// the label with the largest sum of probabilities.
     pub ignores_labels: bool,
 }
 
@@ -328,7 +329,7 @@ impl Pixels {
             union(&mut parents, a as usize, b as usize);
         }
         let mut parts: Vec<Vec<u32>> = Vec::new();
-        // Number of the part by its first pixel, which comes before the others of the part.
+        // Index of the part by its first pixel, which precedes the other pixels of the part.
         let mut part_of_first = vec![0; pixels.len()];
         for k in objects.pixels.iter().map(|k| *k as usize) {
             let first = find_root(&mut parents, k);
@@ -379,7 +380,7 @@ impl Pixels {
 
     /// Returns masks of disjoint segments at full resolution, as row-major indices in ascending
     /// order. Each pixel belongs to the segment of the network pixel with the most similar depth
-    /// among the four nearest. Of segments that overlap, the later one gets the pixel.
+    /// among the four nearest. If segments overlap, the later segment gets the pixel.
     pub fn masks(&self, segments: &[Segment], depth_m: &[f32]) -> Vec<Vec<u32>> {
         let (pixels, columns) = (&self.pixels, self.columns());
         let (width, rows) = (self.camera.width as usize, pixels.len() / columns);
@@ -410,8 +411,8 @@ impl Pixels {
     }
 }
 
-/// Maximum number of segments of an image; the largest ones count. Masks number them with 16 bits,
-/// and images of 2,048 pixels have room for more.
+/// Maximum number of segments of an image; the largest ones count. Masks store segment numbers in
+/// 16 bits, and an image of 2,048 x 2,048 pixels could have more segments.
 const MAX_SEGMENTS: usize = u16::MAX as usize - 1;
 
 /// Returns the label with the largest sum of probabilities; the lowest one wins ties.

@@ -7,8 +7,8 @@ use chaic_core::{Action, Frame, Observation, Outcome, Vec3};
 
 use crate::tracker::depths_at;
 
-/// Maximum turn of the camera since the keyframe, radians: two turns of 15 degrees. The image has a
-/// width of 90 degrees, so two keyframes of a rotation in place show each object.
+/// Maximum turn of the camera since the keyframe, radians: two turns of 15 degrees. The horizontal
+/// field of view is 90 degrees, so each object is visible in two keyframes of a rotation in place.
 const MAX_TURN_RAD: f32 = 0.55;
 /// Maximum displacement of the camera since the keyframe, meters; a step is longer.
 const MAX_STEP_M: f32 = 0.1;

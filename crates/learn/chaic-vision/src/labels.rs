@@ -20,8 +20,8 @@ pub fn class_of(label: u8) -> Option<ClassId> {
     ClassId::all().nth(usize::from(label).checked_sub(1)?)
 }
 
-/// Returns half the largest extent of each label's class, in meters. Offsets to object centers are
-/// in units of it.
+/// Returns half the largest extent of each label's class, in meters. This is the unit of the
+/// predicted offsets to object centers.
 pub fn half_extents_m() -> Vec<f32> {
     let half = |class: ClassId| 0.5 * class.info().size_m.into_iter().fold(0.05, f32::max);
     std::iter::once(1.0).chain(ClassId::all().map(half)).collect()

@@ -14,8 +14,8 @@ use crate::views::LabeledView;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LossConfig {
-    /// Area of an object whose pixels count as much as background pixels, pixels. Pixels of smaller
-    /// objects count more, those of larger ones less.
+    /// Area of an object whose pixels have the weight of background pixels, pixels. Pixels of
+    /// smaller objects have more weight, pixels of larger objects less.
     #[serde(alias = "even_px")]
     pub reference_area_px: f32,
     /// Exponent of the ratio of areas.
@@ -146,8 +146,8 @@ pub struct Loss {
     pub object_accuracy: f64,
 }
 
-/// Exponential of a non-positive number by repeated squaring, with equal rounding on every
-/// machine.
+/// Returns the exponential of a non-positive number by repeated squaring, with equal rounding on
+/// every machine.
 #[inline(always)]
 pub(crate) fn exp(x: f32) -> f32 {
     // (1 + x / 1024) ^ 1024 has an error of 0.05 % at -1, and less near 0.

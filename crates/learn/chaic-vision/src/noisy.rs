@@ -16,7 +16,7 @@ use crate::instances::Instance;
 use crate::labels::label_of;
 use crate::perception::Tracking;
 
-/// Pixels of the images that rates refer to.
+/// Number of pixels of the images for which rates are measured.
 const MEASURED_PX: usize = 512 * 512;
 
 /// Error rates of a detector.
@@ -28,14 +28,14 @@ pub struct DetectorNoiseModel {
     /// are always missed. Areas in smaller images are scaled to 512x512.
     #[serde(alias = "missed")]
     pub miss_rate_by_area: Vec<(u32, f32)>,
-    /// Fraction of detected objects with the label of a random class of the same role, which may be
-    /// their own.
+    /// Fraction of detected objects that get the label of a random class of the same role. The
+    /// random class may be the true class.
     #[serde(alias = "misnamed")]
     pub misclassification_rate: f32,
     /// Mean number of false positives per image.
     #[serde(alias = "invented")]
     pub false_positives_per_image: f32,
-    /// Mean score of correct detections, and of false positives and misclassified ones.
+    /// Mean score of correct detections, then of false positives and misclassified detections.
     pub scores: [f32; 2],
 }
 
@@ -106,7 +106,7 @@ impl DetectorNoiseModel {
     /// # Errors
     /// One line that names the key.
     pub fn check(&self) -> Result<(), String> {
-        /// Maximum mean number of false positives per image; more would cover it.
+        /// Maximum mean number of false positives per image; more would cover the image.
         const MAX_FALSE_POSITIVES: f32 = 1000.0;
         let is_fraction = |x: &f32| (0.0..=1.0).contains(x);
         let rates = &self.miss_rate_by_area;
@@ -294,7 +294,7 @@ mod tests {
                 "misclassification_rate",
                 DetectorNoiseModel { misclassification_rate: f32::NAN, ..none() },
             ),
-            // With so many, an image would never be complete.
+            // With this rate, the generation of an image would take too long.
             (
                 "false_positives_per_image",
                 DetectorNoiseModel { false_positives_per_image: 1e9, ..none() },

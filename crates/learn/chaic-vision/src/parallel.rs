@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
 
-/// Maps each index to a value, in order; returns `None` if `stop` is set meanwhile. `init` makes
-/// the working state of a thread.
+/// Maps each index to a value, in order; returns `None` if `stop` is set meanwhile. `init` creates
+/// the working state of each thread.
 pub(crate) fn map_in_order<S, T: Send>(
     indices: std::ops::Range<usize>,
     n_threads: usize,

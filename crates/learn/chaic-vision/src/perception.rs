@@ -16,7 +16,8 @@ use crate::labels::label_of;
 use crate::tracker::{Measurement, Tracker, TrackerConfig};
 use crate::trained::{DetectorInference, TrainedDetector};
 
-/// Name of the learned detector with ground-truth classes: it measures what wrong names cost.
+/// Name of the perception with learned detections and ground-truth classes. It measures the cost of
+/// wrong labels.
 pub const GT_NAMES: &str = "gt_names";
 
 /// Creates perception with a trained detector.
@@ -34,8 +35,8 @@ impl LearnedPerceptionFactory {
         LearnedPerceptionFactory { detector: Arc::new(detector), name, has_true_names: false }
     }
 
-    /// Creates a factory that replaces the names of detections by the class of the object that most
-    /// of their pixels show, and drops detections of structure. It measures what wrong names cost.
+    /// Creates a factory that replaces the labels of each detection by the true class of most of
+    /// its pixels, and drops detections of structure. It measures the cost of wrong labels.
     pub fn with_true_names(detector: TrainedDetector) -> LearnedPerceptionFactory {
         let name = format!("{GT_NAMES} {}", detector.digest());
         LearnedPerceptionFactory { detector: Arc::new(detector), name, has_true_names: true }
@@ -92,7 +93,7 @@ impl Perception for LearnedPerception {
         self.tracking.tracker.update_hands(hands, last);
     }
 
-    /// Images that are missing or of another size show nothing.
+    /// Returns no detections if an image is missing or has another size.
     fn perceive(&mut self, observation: &Observation) -> Percepts {
         self.tracking.last.clear();
         let camera = &observation.camera;
@@ -136,8 +137,8 @@ impl Perception for LearnedPerception {
     }
 }
 
-/// Names each instance by the class of the object that most of its pixels show, in an image of ids;
-/// drops instances of structure. Scores stay as they are.
+/// Replaces the labels of each instance by the true class of most of its pixels, given an image of
+/// ids. Drops instances of structure. Scores do not change.
 pub fn with_true_names(
     instances: Vec<Instance>,
     ids: &[u16],
@@ -159,8 +160,8 @@ pub fn with_true_names(
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tracking {
     pub(crate) tracker: Tracker,
-    /// Tracks in the last image, with one pixel of each: detected ones, and missed ones at their
-    /// remembered place.
+    /// Tracks in the last image, each with one pixel: detected tracks, and missed tracks at their
+    /// remembered position.
     pub(crate) last: Vec<(TrackId, [u32; 2])>,
 }
 

@@ -22,8 +22,8 @@ pub const LEARNED: &str = "learned";
 /// rates.
 pub const NOISY: &str = "noisy";
 
-/// Name of ground-truth masks and classes with learned tracks: it measures what errors of the tracker
-/// cost.
+/// Name of the perception with ground-truth masks and classes, and tracks of the tracker. It measures
+/// the cost of tracking errors.
 pub const GT_MASKS: &str = "gt_masks";
 
 /// Maximum size of a file of weights or rates, bytes.
@@ -98,7 +98,8 @@ pub fn read_detector(path: &Path) -> Result<TrainedDetector, PerceptionError> {
 /// Reads a detector for helpers from a file.
 ///
 /// # Errors
-/// As [`read_detector`], and if the detector has one stage only, as between the two trainings.
+/// As [`read_detector`], and if the detector has only its first stage, as after the first part of
+/// the training.
 fn read_complete_detector(path: &Path) -> Result<TrainedDetector, PerceptionError> {
     let detector = read_detector(path)?;
     match detector.second_stage {
@@ -178,7 +179,7 @@ fn factory_from_name(name: &str) -> Result<Arc<dyn PerceptionFactory>, Perceptio
         let rates: DetectorNoiseModel =
             serde_json::from_slice(&bytes).map_err(|e| rates_error(e.to_string()))?;
         rates.check().map_err(rates_error)?;
-        // The digest in the recorded name shows if the file has changed since.
+        // The digest in the recorded name shows whether the file has changed since the recording.
         let recorded_name =
             format!("{NOISY} {} {}", path.display(), chaic_nn::weights::digest(&bytes));
         return Ok(Arc::new(NoisyPerceptionFactory::new(rates, recorded_name)));
@@ -233,7 +234,7 @@ mod tests {
         refused(Some(&behavior), "weights of `chaic behavior 4`, expected `chaic detector 2");
         let one_stage = TrainedDetector { second_stage: None, ..complete };
         refused(Some(&one_stage.to_bytes().unwrap()), "lacks its second stage; train it with");
-        // Evaluations and trainings between the two stages read it.
+        // Evaluation and further training accept a detector with only the first stage.
         assert!(read_detector(&path).unwrap().second_stage.is_none());
         std::fs::write(&path, &bytes).unwrap();
         let name = format!("{LEARNED}:{}", path.display());

@@ -5,7 +5,7 @@ use crate::instances::{InstanceConfig, Pixels, Segment};
 
 /// Maximum number of proposals of an image.
 pub const MAX_PROPOSALS: usize = 64;
-/// Proposals with a greater overlap (intersection over union) are duplicates.
+/// Proposals with a greater intersection over union (IoU) are duplicates.
 const DUPLICATE_IOU: f32 = 0.9;
 
 /// Groupings whose segments are proposals, in order of precedence.
@@ -25,7 +25,7 @@ pub const GROUPINGS: [InstanceConfig; 6] = [
         relabel_extents: 1.2,
         ..InstanceConfig::DEFAULT
     },
-    // Structures that are larger than their class, as fences are.
+    // Structures that are larger than their class, such as fences.
     InstanceConfig {
         center_vote_radius: f32::INFINITY,
         join_extents: 0.0,
@@ -40,7 +40,7 @@ pub const GROUPINGS: [InstanceConfig; 6] = [
         ignores_labels: true,
         ..InstanceConfig::DEFAULT
     },
-    // Objects that stand alone.
+    // Objects that stand apart from others.
     InstanceConfig {
         gap_extents: 0.2,
         center_vote_radius: f32::INFINITY,

@@ -12,8 +12,9 @@ use crate::loss::ln;
 /// Side of a crop, samples.
 pub const SIDE: usize = 32;
 /// Channels of a sample: red, green, blue, depth relative to the proposal in units of the crop's
-/// side, height above the floor, surface normal (see [`features`](crate::features::features));
-/// whether it belongs to the proposal, has its label, votes for its center, and lies in the image.
+/// side, height above the floor, surface normal (see [`features`](crate::features::features)); and
+/// four flags: the sample belongs to the proposal, has its label, votes for its center, and lies in
+/// the image.
 pub const N_CHANNELS: usize = 12;
 /// Scalars before the fraction of the proposal's pixels with each label.
 const N_MEASURES: usize = 23;
@@ -49,7 +50,7 @@ impl RoiBox {
         RoiBox { origin, side }
     }
 
-    /// Returns the length of a sample.
+    /// Returns the side of a sample, pixels at the network's resolution.
     pub fn step(&self) -> f32 {
         self.side / SIDE as f32
     }
@@ -94,7 +95,8 @@ pub struct RoiSource<'a> {
 
 impl RoiSource<'_> {
     /// Writes the crop of a proposal, shape [`SIDE`, `SIDE`, `N_CHANNELS`], and its scalars; returns
-    /// the square. Pixels of the proposal are in ascending order: sums over them have one order.
+    /// the square. Pixels of the proposal must be in ascending order, so that sums over them have a
+    /// fixed order.
     pub fn write(&self, proposal: &Segment, crop: &mut [f32], scalars: &mut [f32]) -> RoiBox {
         let columns = self.pixels.columns();
         let pixels = self.pixels.pixels();

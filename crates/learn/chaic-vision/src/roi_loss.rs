@@ -10,10 +10,11 @@ use crate::roi::{RoiBox, SIDE};
 use crate::roi_network::{N_QUALITIES, RoiNetwork};
 use crate::views::LabeledView;
 
-/// Coefficient of the losses of mask and qualities, relative to that of labels.
+/// Coefficients of the mask loss and the quality loss, relative to the label loss.
 const MASK_COEF: f32 = 1.0;
 const QUALITY_COEF: f32 = 0.5;
-/// Fraction of a proposal's pixels that its object covers, at least; otherwise it shows none.
+/// Minimum fraction of a proposal's pixels that an object must cover; otherwise the proposal is
+/// background.
 const MIN_COVERAGE: f32 = 0.5;
 
 /// Target of a proposal.
@@ -21,7 +22,8 @@ const MIN_COVERAGE: f32 = 0.5;
 pub struct RoiTarget {
     /// Label of the object that covers most of the proposal; the background if none does.
     pub label: u8,
-    /// For each sample of the crop: 1 in the object, 0 beside it, -1 outside of the image.
+    /// For each sample of the crop: 1 inside the object, 0 outside the object, -1 outside the
+    /// image.
     pub mask: Vec<i8>,
     /// Pixels of the object outside of the crop, in samples.
     pub n_outside: f32,
@@ -58,7 +60,7 @@ impl ViewTruth<'_> {
     }
 
     /// Returns the object that covers most of a proposal, and the number of shared pixels; `None` if
-    /// it covers less than half of it.
+    /// no object covers at least half of the proposal.
     fn object(&self, proposal: &Segment) -> Option<(usize, u32)> {
         let mut shared = vec![0u32; self.areas.len()];
         for k in &proposal.pixels {
@@ -112,9 +114,9 @@ pub struct RoiLoss {
     pub mask: f64,
     /// Cross entropy of qualities above the entropy of their targets.
     pub qualities: f64,
-    /// Fraction of objects with the right label.
+    /// Fraction of objects with the correct label.
     pub accuracy: f64,
-    /// Mean intersection over union of objects with proposals and redrawn masks.
+    /// Mean intersection over union of objects with their proposals, then with the redrawn masks.
     pub iou: [f64; N_QUALITIES],
 }
 

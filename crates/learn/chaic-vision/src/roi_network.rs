@@ -1,5 +1,5 @@
-//! Network of the detector's second stage: names a proposal, redraws its mask, and predicts how well
-//! either mask fits the object.
+//! Network of the detector's second stage. It classifies a proposal, predicts a refined (redrawn)
+//! mask, and predicts the IoU of each mask with the object.
 
 use chaic_nn::{Kernel, Network, Node, Shape};
 
@@ -18,7 +18,8 @@ const IMAGE_WIDTH: usize = 192;
 const SCALARS_WIDTH: usize = 128;
 const EMBEDDING_WIDTH: usize = 256;
 
-/// Predicted overlaps with the object: of the proposal's mask and of the redrawn mask.
+/// Number of predicted qualities: the IoU of the proposal's mask and of the redrawn mask with the
+/// object.
 pub const N_QUALITIES: usize = 2;
 
 /// Network of the second stage: 12 million multiplications per proposal. The layers of the mask

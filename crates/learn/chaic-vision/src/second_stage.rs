@@ -1,5 +1,5 @@
-//! Second stage of the detector: names, redraws and scores proposals, and suppresses those that show
-//! the same object.
+//! Second stage of the detector: classifies and scores proposals, predicts refined (redrawn) masks,
+//! and suppresses duplicates of the same object.
 
 use chaic_nn::simd::widest;
 use chaic_nn::{Pass, Tensor};
@@ -10,24 +10,25 @@ use crate::loss::{sigmoid, softmax};
 use crate::roi::{RoiBox, RoiSource, SIDE};
 use crate::roi_network::{N_QUALITIES, RoiNetwork};
 
-/// Number of proposals that run through the network together.
+/// Number of proposals per forward pass.
 const BATCH_SIZE: usize = 16;
 /// If two instances overlap more than this (intersection over union), the one with the lower score
 /// is dropped.
 const SUPPRESSION_IOU: f32 = 0.5;
 /// Instances of which less than this fraction remains, after others took their pixels, are dropped.
 const MIN_REMAINING: f32 = 0.4;
-/// A mask with another label is an object in front of the better one if its area is at most this
-/// fraction, and its score at least this high. Recall of small objects, not cut by the
-/// edge, in eight episodes of validation seeds, up to 2 m, 2 to 4 m and 4 to 10 m away: 0.69, 0.81
-/// and 0.82 without this rule, 0.85, 0.93 and 0.91 with it; fractions of 0.25 and 0.8 give the same
-/// within 0.03.
+/// Maximum area of a mask in front of a better mask with another label, as a fraction of the better
+/// mask's area. The score of the mask must be at least [`MIN_NESTED_SCORE`]. Without this rule, the
+/// recall of small objects up to 2 m, 2 to 4 m and 4 to 10 m away was 0.69, 0.81 and 0.82. With the
+/// rule it is 0.85, 0.93 and 0.91 (eight episodes of validation seeds, objects not cut by the image
+/// border). Fractions of 0.25 and 0.8 give the same within 0.03.
 const MAX_NESTED_FRACTION: f32 = 0.5;
-/// See [`MAX_NESTED_FRACTION`].
+/// Minimum score of the mask in front, see [`MAX_NESTED_FRACTION`].
 const MIN_NESTED_SCORE: f32 = 0.2;
 /// Instances with a lower score are dropped.
 const MIN_SCORE: f32 = 0.02;
-/// Number of names of an instance, at most, and minimum probability of those after the first.
+/// Maximum number of candidate labels of an instance, and minimum probability of every label after
+/// the first.
 const MAX_NAMES: usize = 4;
 const MIN_NAME_PROBABILITY: f32 = 0.02;
 
@@ -96,8 +97,8 @@ impl SecondStage {
         candidates
     }
 
-    /// Returns the objects among proposals, with uncalibrated scores; `inference` is one of
-    /// [`SecondStage::inference`].
+    /// Returns the objects among proposals, with uncalibrated scores; `inference` holds the buffers
+    /// of [`SecondStage::inference`].
     pub fn instances(
         &self,
         source: &RoiSource<'_>,
@@ -166,7 +167,7 @@ impl Candidate {
         names.retain(|name| *name == first || name.1 > MIN_NAME_PROBABILITY);
         names.iter_mut().for_each(|(_, p)| *p *= quality);
         let (label, score) = names[0];
-        // Also refuses a score that is not a number.
+        // The comparison is false for NaN.
         let is_likely = score >= MIN_SCORE;
         if !is_likely {
             return None;
@@ -211,8 +212,8 @@ pub(crate) fn redrawn_pixels(mask: &[f32], roi: RoiBox, pixels: &Pixels) -> Vec<
 }
 
 /// Drops candidates that show the same object as a better one, and gives each pixel to one candidate;
-/// candidates come in descending order of score. Of overlapping candidates the better one owns the
-/// pixels, unless the other is a small object in front of it, such as a plate on a table: redrawn
+/// candidates come in descending order of score. If candidates overlap, the better one gets the
+/// shared pixels. The exception is a small object in front of it, such as a plate on a table, because
 /// masks of furniture also cover the objects on it.
 fn suppress(candidates: Vec<Candidate>, n_pixels: usize) -> Vec<Candidate> {
     let mut kept: Vec<Candidate> = Vec::new();
@@ -257,7 +258,7 @@ fn suppress(candidates: Vec<Candidate>, n_pixels: usize) -> Vec<Candidate> {
     with_own_pixels.collect()
 }
 
-/// Number of common elements of two ascending lists.
+/// Returns the number of common elements of two ascending lists.
 pub(crate) fn n_shared(a: &[u32], b: &[u32]) -> usize {
     let [Some(first_a), Some(first_b)] = [a, b].map(<[u32]>::first) else { return 0 };
     let mut i = a.partition_point(|k| k < first_b);

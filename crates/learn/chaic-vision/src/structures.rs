@@ -1,5 +1,5 @@
-//! Structures of several panels, such as fences: a structure is one instance, since no helper does
-//! anything with a panel.
+//! Structures of several panels, such as fences. A structure is one instance, because no helper
+//! interacts with single panels.
 
 use chaic_core::EntityId;
 use chaic_world::{ObjectSpec, Setup};

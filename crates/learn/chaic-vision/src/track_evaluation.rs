@@ -31,13 +31,13 @@ use crate::evaluate::MIN_AREA_PX;
 use crate::parallel::map_in_order;
 use crate::views::DatasetSplit;
 
-/// Upper ends of the ranges of distance, meters. Objects are measured up to 10 m (facts A1.8).
+/// Upper bounds of the distance ranges, meters. Objects are measured up to 10 m (facts A1.8).
 const RANGES_M: [u32; 4] = [2, 4, 7, 10];
 /// Maximum number of episodes of an evaluation: half of the seeds, so that the other half can replace
 /// those without a valid episode.
 pub const MAX_EPISODES: u32 = 5000;
-/// Number of seeds that are tried for an episode. Up to the number of tasks, no episode can occur
-/// twice.
+/// Number of seeds that are tried for an episode. It is at most the number of tasks, so no episode
+/// can occur twice.
 const MAX_ATTEMPTS: u64 = 8;
 /// A remembered object may be this far from the true position, plus half of its largest horizontal
 /// extent, meters.
@@ -76,7 +76,7 @@ impl Rate {
 pub struct TrackReport {
     /// Number of evaluated episodes.
     pub episodes: usize,
-    /// Episodes that broke down. They are left out of all other fields.
+    /// Episodes that failed. All other fields exclude them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub failures: Vec<EpisodeFailure>,
     /// Number of processed images.
@@ -98,7 +98,7 @@ pub struct TrackReport {
     pub memory_recall_by_m: BTreeMap<u32, Rate>,
     /// The same for all distances up to 10 m.
     pub memory_recall: Rate,
-    /// Mean number of changes of the track of an object.
+    /// Mean number of identity switches per object: changes of its track.
     pub identity_switches: Rate,
     /// Fraction of detected people that are visible within 0.5 m of their detected position.
     pub person_precision: Rate,
@@ -111,7 +111,7 @@ pub struct TrackReport {
     pub classes: BTreeMap<&'static str, ClassCounts>,
 }
 
-/// Episode that broke down.
+/// Episode that failed.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct EpisodeFailure {
     /// Name of the episode.
@@ -464,7 +464,7 @@ fn lock(records: &Mutex<EpisodeRecord>) -> MutexGuard<'_, EpisodeRecord> {
     records.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Adds recording to a perception.
+/// Factory that wraps a perception, so that its detections are recorded.
 struct RecorderFactory<'a> {
     perception: &'a dyn PerceptionFactory,
     records: Arc<Mutex<EpisodeRecord>>,
@@ -546,7 +546,7 @@ impl Perception for RecordedPerception {
     }
 }
 
-/// Copies the remembered objects after each image.
+/// Behavior model that copies the remembered objects after each image.
 struct MemoryRecorder {
     records: Arc<Mutex<EpisodeRecord>>,
     log: BehaviorLog,

@@ -1,8 +1,8 @@
 //! Data association: matches the detections of each image to tracks of objects.
 //!
 //! The cost of a match depends on class, position and extent; the cheapest pairs match first. A
-//! carried object may have moved by walking speed; a released object lies near the agent. The agent
-//! knows its own held objects from proprioception: they are no detections.
+//! carried object may have moved at walking speed; a released object lies near the agent. The agent
+//! knows its own held objects from proprioception, so they are excluded from detections.
 
 mod masks;
 mod missing;
@@ -22,8 +22,9 @@ use self::masks::is_within;
 use self::plan_extent::PlanExtent;
 use crate::labels::class_of;
 
-// These constants were chosen by reasoning, not by measurement.
-/// A detection whose label agrees with that of a track with a lower probability has another label.
+// The values of these constants are estimates, not measurements.
+/// Detection and track have different labels if the probability of equal labels is below this
+/// value.
 const MIN_AGREEMENT: f32 = 0.02;
 /// Cost of a match between labels that certainly differ, relative to the maximum displacement.
 const DISAGREEMENT_COST: f32 = 0.5;
@@ -40,13 +41,13 @@ pub struct TrackerConfig {
     pub birth_log_odds: f32,
     /// Score of a first detection whose track has initial log odds of 0.
     pub birth_score: f32,
-    /// Increase of log odds per unit of score of a matched detection.
+    /// Increase of a track's log odds at a match, per unit of score of the detection.
     pub hit_log_odds: f32,
     /// Decrease of log odds if the unoccluded place of the object does not show it.
     pub miss_log_odds: f32,
     /// Minimum and maximum log odds.
     pub log_odds_range: [f32; 2],
-    /// Tracks above these log odds are reported.
+    /// Minimum log odds of a reported track.
     pub report_log_odds: f32,
     /// Maximum displacement of small static objects.
     pub max_static_m: f32,
@@ -212,8 +213,8 @@ pub struct Tracker {
     removed_obstacle: Option<TrackId>,
     /// Camera and frame of the last image.
     last_image: Option<(Camera, Frame)>,
-    /// Frame of the image before the present one, if both have the same view. What a view shows or
-    /// lacks a second time is no new evidence: the detector repeats its errors.
+    /// Frame of the image before the present one, if both have the same view. A second image of the
+    /// same view adds no evidence, because the detector repeats its errors.
     repeated: Option<Frame>,
 }
 
@@ -362,7 +363,8 @@ impl Tracker {
             }
         }
         let covers: Vec<bool> = objects.iter().map(|object| self.cover(object, now)).collect();
-        // Matched detections first: fragments are those of the objects that this image shows.
+        // Matched detections come first, because a fragment belongs to an object that this image
+        // shows.
         let (matched, unmatched): (Vec<usize>, Vec<usize>) =
             (0..objects.len()).partition(|k| track_of.contains_key(k));
         let mut found = Vec::new();
@@ -398,7 +400,7 @@ impl Tracker {
         found
     }
 
-    /// True if an object is within the reach of a visible person, and not fixed.
+    /// Returns whether an object is movable and within reach of a visible person.
     fn may_be_in_hand(&self, measurement: &Measurement, now: Frame) -> bool {
         let extent = &measurement.extent;
         let near = |at: &Vec3| horizontal_distance(*at, extent.position_in_world) < 1.0;
@@ -407,8 +409,9 @@ impl Tracker {
             && self.people.values().any(|(at, frame)| *frame == now && near(at))
     }
 
-    /// Marks the tracks inside a mask of their label that is too large for one object: it shows neither
-    /// that they are missing nor that there is another object. Returns whether it contains a track.
+    /// Marks the tracks inside a mask that has their label and is too large for one object. Such a mask
+    /// is evidence neither that they are missing nor that there is another object. Returns whether it
+    /// contains a track.
     fn cover(&mut self, object: &DetectedObject<'_>, now: Frame) -> bool {
         let (config, label) = (self.config, object.measurement.label());
         let seen = object.large_extent(label).filter(|seen| config.is_oversized(label, seen));
@@ -424,7 +427,8 @@ impl Tracker {
         covers
     }
 
-    /// Cost of a match between a detection and a track; `None` if it is impossible.
+    /// Returns the cost of a match between a detection and a track; `None` if the match is
+    /// impossible.
     fn cost(&self, track: &Track, object: &DetectedObject<'_>, now: Frame) -> Option<f32> {
         let (config, measurement) = (&self.config, object.measurement);
         let distance_m = track.position.distance(measurement.extent.position_in_world);
@@ -446,7 +450,8 @@ impl Tracker {
         Some(if track.is_released { cost } else { cost + similarity_cost })
     }
 
-    /// Displacement of a track if a detection with its label shows it; `None` if it is out of reach.
+    /// Returns the displacement of a track, given that a detection with its label shows it; `None`
+    /// if the object cannot have moved that far.
     fn displacement_m(
         &self,
         track: &Track,
@@ -477,7 +482,7 @@ impl Tracker {
         (distance_m < max_m).then_some(distance_m)
     }
 
-    /// True if a detection is a part of an object that was just seen.
+    /// Returns whether a detection is a fragment of an object that was just seen.
     fn is_fragment(&self, object: &DetectedObject<'_>, now: Frame) -> bool {
         let measurement = object.measurement;
         let label = measurement.label();
@@ -528,7 +533,7 @@ impl TrackerConfig {
     }
 
     /// Returns whether the union of two extents is not larger than an object. Some objects are larger
-    /// than their class; the larger extent shows it.
+    /// than their class; then the larger of the two extents is the limit.
     fn fits_object(&self, label: u8, a: &PlanExtent, b: &PlanExtent) -> bool {
         let max_m = self.max_diameter * diagonal_m(label);
         let max_m = max_m.max(a.diameter_m()).max(b.diameter_m());

@@ -61,7 +61,7 @@ pub struct DetectorTrainingConfig {
     pub warm_up: u64,
     /// Parts of a batch that are processed in parallel. Their gradients are added in a fixed order.
     pub shards: usize,
-    /// Blocks of the encoder. Only trainings can read weights of blocks other than the default.
+    /// Blocks of the encoder. Only training can read weights with other than the default blocks.
     pub blocks: Blocks,
     /// Crops of the shards, which alternate between the two.
     pub crops: [CropConfig; 2],
@@ -69,7 +69,8 @@ pub struct DetectorTrainingConfig {
     pub views: ViewConfig,
     /// Number of validation views on which a validation measures the precision.
     pub validation_views: usize,
-    /// Number of training views, drawn as a helper sees them, that a validation calibrates scores on.
+    /// Number of training views on which a validation calibrates scores; they are distributed like
+    /// the views of a helper.
     pub calibration_views: usize,
     /// Weights of the loss.
     pub loss: LossConfig,
@@ -180,7 +181,7 @@ fn draw_batch(
                     None => rng.below(size - side + 1),
                 };
                 let aligned = first.min(size - side) / STRIDE * STRIDE;
-                // A small crop could end before the pixel.
+                // Without this shift, a small crop could end before the pixel.
                 center.map_or(aligned, |at| {
                     aligned.max((at + 1).saturating_sub(side).next_multiple_of(STRIDE))
                 })
@@ -320,7 +321,7 @@ impl DetectorLearner {
     pub(crate) fn trained(&self) -> TrainedDetector {
         let first_stage =
             TrainedDetector::uncalibrated(&self.detector, &self.learner.ema_parameters);
-        // `--weights` can hold a trained second stage.
+        // The file of `--weights` can contain a trained second stage.
         let initial = || self.roi_network.network.init_parameters(self.config.seed);
         let is_trained =
             self.roi_learner.adam.steps > 0 || self.roi_learner.parameters != initial();
@@ -345,7 +346,7 @@ const CROP_BOUNDS: BoundTable = &[
     ("uniform_crop_fraction", FRACTION),
 ];
 
-/// Views with more added objects show little else.
+/// Bounds of the view distribution. Views with more added objects would show little else.
 const VIEW_BOUNDS: BoundTable = &[
     ("size_px", integer(32, 1024)),
     ("swap_fraction", FRACTION),
@@ -454,8 +455,8 @@ impl Trainer for DetectorLearner {
     }
 
     fn fixed_keys() -> Vec<&'static str> {
-        // The first decides about the network. The second draws the initial parameters, by which the training
-        // knows whether the second stage is trained. Step and shard number the drawn views.
+        // `blocks` determines the network. `seed` determines the initial parameters; a comparison with them
+        // shows whether the second stage is trained. Views are drawn by step and shard.
         vec!["blocks", "seed", "shards"]
     }
 

@@ -199,7 +199,7 @@ impl TrainedDetector {
     }
 
     /// Returns the instances among proposals, in descending order of score; none without a second
-    /// stage. `inference` and `pixels` are those of the last call of
+    /// stage. `inference` and `pixels` must come from the last call of
     /// [`TrainedDetector::first_stage`].
     pub fn instances_among(
         &self,

@@ -80,8 +80,8 @@ impl ViewConfig {
         distance_m: [0.6, 5.0],
     };
 
-    /// Initial scenes with additional objects, which show all classes about equally often. Reported
-    /// accuracy refers to it.
+    /// Initial scenes with additional objects, which show all classes about equally often. The
+    /// reported accuracy is measured on this distribution.
     pub const ALL_CLASSES: ViewConfig = ViewConfig {
         n_added: 4,
         decor_fraction: 0.3,
@@ -96,7 +96,7 @@ impl ViewConfig {
         ..ViewConfig::TRAINING
     };
 
-    /// Initial scenes from random poses. Score calibration uses it.
+    /// Initial scenes from random poses. Score calibration uses this distribution.
     pub const NATURAL: ViewConfig = ViewConfig {
         swap_fraction: 0.0,
         n_added: 0,
@@ -145,13 +145,13 @@ pub struct SyntheticViews {
 
 /// Number of views per scene.
 const VIEWS_PER_SCENE: usize = 2;
-/// Attempts at a view before the scene's next view.
+/// Maximum number of attempts to render one view.
 const MAX_ATTEMPTS: usize = 4;
 /// Maximum fraction of pixels nearer than [`NEAR_M`]; more means that the camera is inside an
 /// object.
 const MAX_NEAR_FRACTION: f32 = 0.1;
 const NEAR_M: f32 = 0.3;
-/// Side of images to which numbers of pixels refer.
+/// Side of the reference image for minimum pixel counts, pixels.
 const REFERENCE_SIZE_PX: u32 = 512;
 /// Minimum pixels of the aimed object in an image of [`REFERENCE_SIZE_PX`].
 const MIN_AIMED_PX: usize = 24;
@@ -162,7 +162,7 @@ const MAX_TOP_M: f32 = 2.0;
 /// Maximum thickness of wall objects, meters.
 const FLAT_M: f32 = 0.1;
 
-/// Candidate positions of a large object.
+/// Number of candidate positions for a large object.
 const LARGE_CANDIDATES: usize = 12;
 
 struct ViewScene {
@@ -173,7 +173,7 @@ struct ViewScene {
     instance_ids: Vec<u16>,
     postures: Vec<Posture>,
     /// Label that views aim at.
-    wanted: Option<u8>,
+    aimed_label: Option<u8>,
 }
 
 impl SyntheticViews {
@@ -235,9 +235,9 @@ impl SyntheticViews {
         let scene = Scene::with_appearance(world.setup(), appearance);
         let labels: Vec<u8> = world.classes().into_iter().map(label_of).collect();
         let postures = world.setup().agents().map(|agent| world.posture(agent)).collect();
-        let wanted = wanted.map(|class| label_of(Some(class)));
+        let aimed_label = wanted.map(|class| label_of(Some(class)));
         let instance_ids = instance_ids(world.setup(), labels.len());
-        Some(ViewScene { world, scene, labels, instance_ids, postures, wanted })
+        Some(ViewScene { world, scene, labels, instance_ids, postures, aimed_label })
     }
 
     /// Returns the setup with replaced small objects, obstacles and furniture, and with additional
@@ -336,7 +336,7 @@ impl SyntheticViews {
         let size_px = self.config.size_px;
         let aimed_at = rng.chance(self.config.aimed_fraction).then(|| {
             let is_movable = rng.chance(self.config.aimed_movable_fraction);
-            let wanted = scene.wanted.and_then(|label| object_with_label(scene, label, rng));
+            let wanted = scene.aimed_label.and_then(|label| object_with_label(scene, label, rng));
             wanted.or_else(|| random_object(scene, is_movable, rng))
         });
         let aimed_at = aimed_at.flatten();
@@ -491,8 +491,8 @@ fn objects_with_roles(scene: &ViewScene, roles: &[Role]) -> Vec<usize> {
     (0..things.len()).filter(|k| has_role(&things[*k])).collect()
 }
 
-/// Draws an object, uniformly over the classes in the scene: of the movable ones, or of all others,
-/// which include people.
+/// Draws an object, uniformly over the classes in the scene. Draws a movable object, or any other
+/// object, including people.
 fn random_object(scene: &ViewScene, is_movable: bool, rng: &mut RngStream) -> Option<EntityId> {
     let is_candidate =
         |label: u8| class_of(label).is_some_and(|class| class.info().is_movable() == is_movable);
@@ -516,7 +516,7 @@ fn object_with_label(scene: &ViewScene, label: u8, rng: &mut RngStream) -> Optio
     rng.choose(&entities).copied()
 }
 
-/// Random position on the ground.
+/// Returns a random position on the ground.
 fn ground_position(setup: &Setup, rng: &mut RngStream) -> Vec3 {
     let at = setup.bounds.min + Vec2::new(rng.unit(), rng.unit()) * setup.bounds.size();
     Vec3::new(at.x, 0.0, at.y)

@@ -237,7 +237,7 @@ fn rates_are_bounded() {
 fn participants_who_never_finish_are_bounded() {
     let folder = Folder::new(&DEFINITION.replace("participants = 3", "participants = 2"));
     let server = folder.server();
-    // The participants whom a finished slot did not need are no places of the other slot.
+    // Unused participants of a finished slot do not count for the other slot.
     let done = server.client(0);
     assert_eq!(done.slot(), 1);
     assert_eq!(done.append(1, &lines()).stored(), 8);

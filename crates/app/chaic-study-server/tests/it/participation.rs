@@ -48,7 +48,8 @@ fn repeated_requests_change_nothing() {
     assert_eq!(first.json(), client.enter().json());
     assert_eq!(client.append(1, &lines[..3]).stored(), 4);
     let text = folder.text(&client.code);
-    // All again, a part, and records of which the answer was lost together with new ones.
+    // All records again, some records again, and records whose answer was lost together with new
+    // ones.
     assert_eq!(client.append(1, &lines[..3]).stored(), 4);
     assert_eq!(client.append(2, &lines[1..2]).stored(), 4);
     assert_eq!(client.append(4, &[]).stored(), 4);

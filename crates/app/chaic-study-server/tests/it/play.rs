@@ -158,7 +158,8 @@ fn an_episode_is_played_to_its_end() {
     );
     let text = folder.text(&client.code);
     assert!(text.ends_with("{\"type\":\"trial_end\",\"trial\":0,\"outcome\":\"ended\"}\n"));
-    // The page learns the end again if it has lost the answer, and its copy of the record is the stored one.
+    // If the page has lost the answer, it gets the end again, and its copy of the record equals the stored
+    // record.
     let turn = json!({ "frames": 1, "view_px": SIDE_PX });
     assert_eq!(client.turn(0, next - 1, &turn).bytes, answers.last().expect("a turn").bytes);
     let after = client.turn(0, next, &turn);

@@ -1,5 +1,5 @@
-//! Promises: a person's episode verifies; a plan or an action has effect; a branch continues the trace
-//! that it was taken from.
+//! Promises: a person's episode verifies; a plan or an action has an effect; a branch continues the
+//! trace that it was taken from.
 
 use chaic_episodes::find_episode;
 

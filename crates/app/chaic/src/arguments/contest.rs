@@ -66,7 +66,7 @@ pub struct SubmitRunArguments {
     /// Folder, for example results/mine, for the submission, its run and its score.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Play the helper rhp too, as the reference of differences.
+    /// Also play the helper rhp, as the reference for differences.
     #[arg(long)]
     pub rhp: bool,
     /// Play with the ordinary partner and with each partner of a list: `suite` or a file, for example

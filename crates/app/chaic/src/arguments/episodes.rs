@@ -63,7 +63,8 @@ pub enum EpisodesCommand {
     },
     /// Make a sealed split: episodes that follow from a secret, and a public commitment to them.
     Seal {
-        /// File of the secret; it is made if it does not exist. Keep it to yourself until the split is opened.
+        /// File of the secret; it is created if it does not exist. Keep the file secret until the split is
+        /// opened.
         #[arg(long, value_name = "FILE")]
         secret: PathBuf,
         /// Tasks, separated by commas, or `all`.
@@ -118,7 +119,7 @@ pub struct OriginalArguments {
     /// Folder for the episode files, for example imported.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Import one half only, for example test [default: every half that is there].
+    /// Import one half only, for example test [default: every half that exists].
     #[arg(long, value_name = "HALF")]
     pub split: Option<ImportHalf>,
     /// Skip episodes that cannot be imported and list them; the exit code is 1 if any was skipped.

@@ -46,8 +46,8 @@ pub struct EvalArguments {
     #[arg(long, alias = "tasks", value_name = "NAMES", value_parser = tasks)]
     pub task: Option<Tasks>,
     /// Helpers, separated by commas; repeatable; `chaic list helpers` prints them. Also a helper process,
-    /// [NAME=]exec:COMMAND, or a policy of `chaic train`, [NAME=]policy:FILE. Each of these is the last of
-    /// its list: repeat --helper for another [default: none,random,rhp,oracle].
+    /// [NAME=]exec:COMMAND, or a policy of `chaic train`, [NAME=]policy:FILE. A process or a policy ends
+    /// its list: repeat --helper to add more [default: none,random,rhp,oracle].
     #[arg(long, alias = "helpers", value_name = "NAMES", value_parser = helpers)]
     pub helper: Option<Vec<HelperList>>,
     /// Split of episodes: test, train, standard, gen:A..B or gen-standard:A..B, for example gen:0..100
@@ -201,7 +201,7 @@ pub struct LanguageArguments {
 #[command(next_help_heading = "Language helpers")]
 pub struct EndpointArguments {
     /// Address of the language model, for example http://127.0.0.1:8000/v1. The key is read from the
-    /// environment variable OPENAI_API_KEY. Give it again with --resume.
+    /// environment variable OPENAI_API_KEY. Repeat this option with --resume.
     #[arg(long, value_name = "URL")]
     pub endpoint: Option<String>,
     /// Name of the language model.

@@ -18,7 +18,7 @@ const DEFAULT_PROCESS_NAME: &str = "exec";
 /// Default name of a policy.
 const DEFAULT_POLICY_NAME: &str = "policy";
 
-/// A helper that is not built in, or names of built-in ones.
+/// Value of `--helper`: names of built-in helpers, or one helper that is not built in.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum HelperArgument {
     /// Names, separated by commas.
@@ -63,7 +63,7 @@ pub struct HelperList(pub Vec<HelperArgument>);
 
 /// Parses one value of `--helper`: names, the last of which may be a process or a policy.
 pub fn helpers(text: &str) -> Result<HelperList, String> {
-    // A command may contain commas, so only those before it separate helpers.
+    // A command may contain commas, so only commas before the command separate helpers.
     let kind = KINDS.iter().filter_map(|kind| text.find(kind)).min();
     let last = kind.and_then(|at| text[..at].rfind(','));
     let Some(last) = last else { return Ok(HelperList(vec![helper(text)?])) };
@@ -80,7 +80,7 @@ fn names(text: &str) -> HelperArgument {
     HelperArgument::Names(text.split(',').map(str::to_owned).collect())
 }
 
-/// Parses one helper, or names.
+/// Parses one process or policy, or a list of names.
 fn helper(text: &str) -> Result<HelperArgument, String> {
     if let Some((name, file)) = split_kind(text, KINDS[0], DEFAULT_POLICY_NAME) {
         check_path(file)?;

@@ -53,7 +53,7 @@ pub struct LeRobotArguments {
     /// Export episodes of this task only.
     #[arg(long, value_name = "TASK", value_parser = task)]
     pub task: Option<TaskId>,
-    /// Frames between samples, 1 to 30; a divisor of 30, which are one second.
+    /// Frames between samples, 1 to 30; a divisor of 30 (30 frames are one second).
     #[arg(long, value_name = "N", default_value_t = 6)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=30))]
     pub every: u32,

@@ -9,9 +9,9 @@ use chaic_training::bounds::MAX_STEPS;
 use chaic_vision::behavior::config::{MAX_CLIPS, MAX_EPISODES};
 use chaic_vision::track_evaluation::MAX_EPISODES as MAX_TRACK_EPISODES;
 
-/// Jobs in parallel: more than the cores of any machine.
+/// Parallel jobs: more than the cores of any machine.
 pub(super) const JOBS: RangeInclusive<i64> = 1..=1024;
-/// Episodes of each task: as many as the longest run has.
+/// Episodes of each task; no run needs more.
 pub(super) const N_EPISODES: RangeInclusive<i64> = 1..=1_000_000;
 /// Seeds of each episode. 10,000 seeds reduce standard errors to a hundredth.
 pub(super) const SEEDS: RangeInclusive<i64> = 1..=10_000;
@@ -23,9 +23,9 @@ pub(super) const RUN_SIZE: RangeInclusive<i64> = MIN_IMAGE_SIZE as i64..=MAX_IMA
 pub(super) const FRAME: RangeInclusive<i64> = 0..=1_000_000;
 /// Distance between the frames of a video.
 pub(super) const EVERY: RangeInclusive<i64> = 1..=10_000;
-/// Images per second of a video: the limit of MP4; that of GIF is lower.
+/// Images per second of a video: the limit of MP4. The limit of GIF is lower.
 pub(super) const FPS: RangeInclusive<i64> = 1..=240;
-/// Objects in the house of a benchmark, which has room for a few hundred.
+/// Objects in the house of `chaic bench`, which has room for a few hundred.
 pub(super) const OBJECTS: RangeInclusive<u64> = 0..=1000;
 /// Clips per behavior.
 pub(super) const CLIPS: RangeInclusive<i64> = 1..=MAX_CLIPS as i64;

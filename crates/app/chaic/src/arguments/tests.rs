@@ -84,7 +84,7 @@ fn check(root: &Command, command: &Command, path: &[String]) -> usize {
             let (lower, upper) = rest.lines().next()?.split_once("..=")?;
             Some(format!("{lower} to {upper}"))
         });
-        // Seconds have a parser of their own.
+        // Options in seconds have their own parser.
         let range = range.unwrap_or_else(|| "0.001 to 3600".to_owned());
         assert!(help.contains(&range), "{label} lacks {range}");
         n_checked += 1;
@@ -181,7 +181,7 @@ fn old_spellings_parse() {
     }
 }
 
-/// `chaic export episodes` counted the episodes of a repeated task twice.
+/// Before a fix, `chaic export episodes` counted the episodes of a repeated task twice.
 #[test]
 fn a_repeated_task_counts_once() {
     let parsed = tasks("shopping,obstacle,shopping").expect("names of tasks");

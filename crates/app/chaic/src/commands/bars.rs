@@ -26,9 +26,9 @@ pub struct RunBars {
     all: MultiProgress,
     total: ProgressBar,
     workers: BTreeMap<usize, (ProgressBar, RunKey)>,
-    /// Prefix of all messages: the part of several runs.
+    /// Prefix of all messages: the name of this run among several runs.
     part: String,
-    /// Suffix of all messages: the remaining time of all parts.
+    /// Suffix of all messages: the remaining time of all runs.
     suffix: String,
     /// Approximate maximum number of log lines.
     max_lines: u64,
@@ -114,7 +114,8 @@ impl RunBars {
         }
     }
 
-    /// Prints a line from time to time if the bars are hidden, for example in a log file.
+    /// Prints a progress line from time to time if the bars are hidden, for example into a log
+    /// file.
     fn log(&self, finished: &FinishedJob) {
         let (done, total) = (self.total.position(), self.total.length().unwrap_or(0));
         if !self.total.is_hidden()
@@ -143,7 +144,7 @@ impl RunBars {
     }
 }
 
-/// Formats an estimate in whole seconds, its precision.
+/// Formats an estimated time in whole seconds.
 pub fn time_left(time: Duration) -> HumanDuration {
     HumanDuration(Duration::from_secs(time.as_secs()))
 }

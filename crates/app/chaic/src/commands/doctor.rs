@@ -18,9 +18,9 @@ use crate::output::{OutputFormat, print_result};
 enum Status {
     /// The check passed.
     Ok,
-    /// A command has a restriction.
+    /// Some command works with restrictions.
     Warning,
-    /// A command cannot work.
+    /// Some command cannot work.
     Failed,
 }
 
@@ -98,7 +98,7 @@ fn vector_instructions(machine: &Machine) -> Check {
     check("vector instructions", status, detail)
 }
 
-/// Says whether this is the program or the Python package, which contains the same command.
+/// Checks whether the program or the Python package runs this command.
 fn started_by() -> Check {
     let program = std::env::current_exe().ok();
     let name = program.as_deref().and_then(Path::file_name).map(|name| name.to_string_lossy());

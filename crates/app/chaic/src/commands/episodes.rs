@@ -50,7 +50,8 @@ pub fn run(command: &EpisodesCommand, format: OutputFormat) -> Result<ExitStatus
     }
 }
 
-/// Episodes in one table. A longer list is printed as several tables, so that it starts at once.
+/// Maximum number of episodes in one table. A longer list is printed as several tables, so that
+/// output starts early.
 const ROWS: usize = 96;
 
 /// Prints while it reads: a split may have more episodes than memory holds.

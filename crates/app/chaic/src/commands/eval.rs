@@ -12,7 +12,7 @@ use chaic_sandbox::Launcher;
 
 use super::eval_partners;
 use super::eval_session::{
-    Played, Session, how_to_complete, in_free_folder, request, write_reports,
+    EvalSession, PlayOutcome, how_to_complete, in_free_folder, request, write_reports,
 };
 use super::given_partners::{GivenPartners, is_partner_file};
 use super::summary::{LineValue, print_scores, report_of};
@@ -39,7 +39,7 @@ pub fn run(
     if let Some(path) = resumed {
         RunFolder::check_started(path)?;
     }
-    let session = Session::new(arguments, launcher, given, hint)?;
+    let session = EvalSession::new(arguments, launcher, given, hint)?;
     let start = Instant::now();
     let play = |path: &Path| session.play(arguments, path, &request, None);
     let played = match &arguments.out {
@@ -47,8 +47,8 @@ pub fn run(
         None => in_free_folder(name, play),
     };
     match played? {
-        Played::Whole(run) => finish(&run, format, start),
-        Played::Part(run) => {
+        PlayOutcome::Complete(run) => finish(&run, format, start),
+        PlayOutcome::Shard(run) => {
             let path = run.folder().path();
             print_error(&format!(
                 "shard {} is played: {} of {}; {}",
@@ -59,7 +59,7 @@ pub fn run(
             ));
             Ok(ExitStatus::from_findings(run.progress().errors > 0))
         }
-        Played::Stopped => Ok(ExitStatus::Interrupted),
+        PlayOutcome::Stopped => Ok(ExitStatus::Interrupted),
     }
 }
 
@@ -73,9 +73,9 @@ fn finish(run: &Run, format: OutputFormat, start: Instant) -> Result<ExitStatus>
         ("Page", LineValue::Path(run.folder().join(REPORT_FILE))),
         ("Time", LineValue::Text(format!("{} min {:02} s", secs / 60, secs % 60))),
     ];
-    // A failed episode run has no trace.
+    // Only finished episode runs have a trace.
     let finished = || run.results().iter().filter(|r| r.summary().is_some());
-    // The order of the results depends on how long the episodes took.
+    // The order of results depends on timing, so the example is selected by key.
     let of_rhp = finished().filter(|r| r.key.helper == "rhp").min_by_key(|r| &r.key);
     let example = of_rhp.or_else(|| finished().min_by_key(|r| &r.key));
     if let Some(example) = example.filter(|_| run.options().traces) {

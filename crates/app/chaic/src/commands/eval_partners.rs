@@ -16,7 +16,7 @@ use chaic_sandbox::Launcher;
 use serde_json::json;
 
 use super::eval_session::{
-    Played, Session, how_to_complete, in_free_folder, request, write_reports,
+    EvalSession, PlayOutcome, how_to_complete, in_free_folder, request, write_reports,
 };
 use super::given_partners::{GivenPartners, require_no_files};
 use super::llm::check_partner;
@@ -39,7 +39,7 @@ pub(super) fn run(
     let list = arguments.partners.as_deref();
     let given = list.map(|list| read_partners(list, &mut files)).transpose()?;
     let options = list.map_or(String::new(), |list| format!(" --partners {}", quoted(list)));
-    let session = Session::new(arguments, launcher, files, options)?;
+    let session = EvalSession::new(arguments, launcher, files, options)?;
     let start = Instant::now();
     let folder = match given {
         Some(suite) if !arguments.resume => {
@@ -62,12 +62,12 @@ pub(super) fn run(
         let part = partner_arguments(arguments, &folder.run_path(entry), entry, &partners)?;
         let request = partner_request(&request, entry);
         match session.play(&part, &folder.run_path(entry), &request, Some(&entry.name))? {
-            Played::Stopped => return Ok(ExitStatus::Interrupted),
-            Played::Part(run) => {
+            PlayOutcome::Stopped => return Ok(ExitStatus::Interrupted),
+            PlayOutcome::Shard(run) => {
                 n_errors += run.progress().errors;
                 is_whole = false;
             }
-            Played::Whole(run) => {
+            PlayOutcome::Complete(run) => {
                 n_errors += run.progress().errors;
                 write_reports(&run)?;
             }
@@ -115,7 +115,7 @@ pub(super) fn read_partners(list: &str, files: &mut GivenPartners) -> Result<Par
 
 /// Starts a run per partner. Nothing is written if one of them is not possible.
 fn start_runs(
-    session: &Session<'_>,
+    session: &EvalSession<'_>,
     arguments: &EvalArguments,
     path: &Path,
     suite: PartnerSuite,
@@ -150,7 +150,7 @@ fn start_runs(
     Ok(folder)
 }
 
-/// Checks that a folder is no run with one partner.
+/// Checks that a folder is not a run with a single partner.
 ///
 /// # Errors
 /// [`EvalError::Options`] if it is one.
@@ -202,7 +202,8 @@ fn partner_arguments(
     let is_model = |entry: &SuitePartner| entry.partner.as_deref().is_some_and(is_language_partner);
     let asks_model =
         helpers.iter().flatten().any(|name| is_language_helper(name)) || is_model(entry);
-    // Options for other partners do not concern this run. If they are for none, the run refuses them.
+    // Options for other partners do not apply to this run. If no partner needs them, the run refuses
+    // them.
     let are_for_others = !asks_model && partners.iter().any(is_model);
     let language =
         if are_for_others { LanguageArguments::default() } else { arguments.language.clone() };

@@ -28,31 +28,31 @@ use crate::output::{counted, print_error, print_progress, print_warning, quoted,
 const QUICK_EPISODES: u32 = 2;
 
 /// State that all runs of one command share.
-pub(super) struct Session<'a> {
+pub(super) struct EvalSession<'a> {
     launcher: &'a Launcher,
     stop: &'static AtomicBool,
     jobs: usize,
     pub shard: Shard,
     /// Partners from files.
     partners: GivenPartners,
-    /// Options that name them, which a resumed run needs again.
+    /// Command-line options that name these partners; a resumed run needs them again.
     partner_options: String,
-    /// Options of language models, which a resumed run needs again. The partner at the interruption may ask
-    /// none, but a later one does.
+    /// Command-line options of language models; a resumed run needs them again. A later partner may need a
+    /// language model even if the interrupted one did not.
     language_options: String,
 }
 
-/// A run after it was played.
-pub(super) enum Played {
+/// Result of playing a run.
+pub(super) enum PlayOutcome {
     /// All episode runs are finished.
-    Whole(Box<Run>),
+    Complete(Box<Run>),
     /// The episode runs of the shard are finished.
-    Part(Box<Run>),
-    /// The user stopped it; a message is printed.
+    Shard(Box<Run>),
+    /// The user stopped the run, and a message was printed.
     Stopped,
 }
 
-impl<'a> Session<'a> {
+impl<'a> EvalSession<'a> {
     /// Starts the threads. A process has one session. `partner_options` name the partners from files.
     ///
     /// # Errors
@@ -62,14 +62,14 @@ impl<'a> Session<'a> {
         launcher: &'a Launcher,
         partners: GivenPartners,
         partner_options: String,
-    ) -> Result<Session<'a>> {
+    ) -> Result<EvalSession<'a>> {
         let stop = interrupt::stop_flag()?;
         let jobs = jobs(arguments.jobs);
         start_threads(jobs)?;
         hide_worker_panics();
         let shard = arguments.shard.unwrap_or(Shard::WHOLE);
         let language_options = llm::resume_options(&arguments.language);
-        Ok(Session { launcher, stop, jobs, shard, partners, partner_options, language_options })
+        Ok(EvalSession { launcher, stop, jobs, shard, partners, partner_options, language_options })
     }
 
     /// Plays the run in a folder. `part` names it among the runs of the command.
@@ -82,7 +82,7 @@ impl<'a> Session<'a> {
         path: &Path,
         request: &RunRequest,
         part: Option<&str>,
-    ) -> Result<Played> {
+    ) -> Result<PlayOutcome> {
         self.with_helpers(arguments, path, |helpers, language| {
             let mode = if arguments.resume { FolderMode::Resume } else { FolderMode::New };
             let (mut run, warnings) = Run::open(path, mode, request, helpers)?;
@@ -119,10 +119,10 @@ impl<'a> Session<'a> {
                     counted(extent.total, "episode run")
                 ));
                 print_error(&resume);
-                return Ok(Played::Stopped);
+                return Ok(PlayOutcome::Stopped);
             }
             let run = Box::new(run);
-            Ok(if extent.finished < extent.total { Played::Part(run) } else { Played::Whole(run) })
+            Ok(if extent.finished < extent.total { PlayOutcome::Shard(run) } else { PlayOutcome::Complete(run) })
         })
     }
 
@@ -162,7 +162,7 @@ impl<'a> Session<'a> {
 
     /// Returns the command that continues a run.
     fn how_to_resume(&self, path: &Path, arguments: &EvalArguments) -> String {
-        let Session { partner_options: partners, language_options: language, .. } = self;
+        let EvalSession { partner_options: partners, language_options: language, .. } = self;
         let helpers = resume_options(arguments);
         let shard = arguments.shard.map_or_else(String::new, |shard| format!(" --shard {shard}"));
         format!(
@@ -234,7 +234,8 @@ pub(super) fn write_reports(run: &Run) -> Result<()> {
     Ok(())
 }
 
-/// Returns the requested run, and a name for its folder. Without any option it is the small benchmark.
+/// Returns the requested run, and a name for its folder. Without any option, the request is the small
+/// benchmark.
 pub(super) fn request(arguments: &EvalArguments) -> (RunRequest, &'static str) {
     let EvalArguments { task, split, episodes, n_episodes, rules, set, seeds, size, .. } =
         arguments;
@@ -274,8 +275,8 @@ fn helper_files(arguments: &EvalArguments) -> HelperFiles {
     arguments.helpers().filter_map(files).collect()
 }
 
-/// Calls a function with the first of `runs/NAME`, `runs/NAME-2`, ... that does not exist, and with the next one
-/// if another command takes that folder first.
+/// Calls a function with the first of `runs/NAME`, `runs/NAME-2`, ... that does not exist. If another command
+/// creates that folder first, calls it with the next name.
 ///
 /// # Errors
 /// Those of the function, and if all folders are taken.
@@ -283,7 +284,7 @@ pub(super) fn in_free_folder<T>(
     name: &str,
     mut begin: impl FnMut(&Path) -> Result<T>,
 ) -> Result<T> {
-    /// Limit of the search.
+    /// Maximum number of tried names.
     const MAX_RUNS: u32 = 10_000;
     let numbered = |k: u32| if k == 1 { name.to_owned() } else { format!("{name}-{k}") };
     let candidates = (1..MAX_RUNS).map(|k| Path::new("runs").join(numbered(k)));
@@ -314,8 +315,8 @@ pub(super) fn hide_worker_panics() {
 
 /// Returns the options of helper processes and policies, which a resumed run needs again.
 ///
-/// The folder of a run does not decide which command runs or with which rights, and holds no weights. It
-/// does not name the source of its episodes either, which stays hidden from helper processes.
+/// For safety, the folder of a run does not determine which command runs or with which rights. It
+/// contains no weights, and no path of the episode files, which stay hidden from helper processes.
 fn resume_options(arguments: &EvalArguments) -> String {
     if arguments.commands().is_empty() && arguments.policies().next().is_none() {
         return String::new();

@@ -105,7 +105,7 @@ fn lerobot(arguments: &LeRobotArguments, format: OutputFormat) -> Result<ExitSta
     if !options.traces {
         return Err(EvalError::NoTraces { path: folder.path().to_owned() }.into());
     }
-    let Selected { traces, n_cut, contents } = select(arguments, &folder, &options)?;
+    let SelectedTraces { traces, n_cut, contents } = select(arguments, &folder, &options)?;
     if traces.is_empty() {
         bail!("{} has {}", folder.path().display(), nothing_selected(arguments, n_cut, &contents));
     }
@@ -115,7 +115,7 @@ fn lerobot(arguments: &LeRobotArguments, format: OutputFormat) -> Result<ExitSta
     let bar = bars::count_bar(traces.len() as u64, "episodes");
     let mut n = 0;
     for path in &traces {
-        // One at a time: all traces of a large run do not fit into memory.
+        // Traces are read one at a time, because all traces of a large run do not fit into memory.
         let (trace, _) = folder.read_trace(path)?;
         let episode = folder.episode(&options, &trace.header.key())?;
         if !writer.add(&trace, &episode, &mut || !stop.load(Ordering::Relaxed))? {
@@ -146,23 +146,23 @@ fn lerobot(arguments: &LeRobotArguments, format: OutputFormat) -> Result<ExitSta
 }
 
 /// Traces selected for export.
-struct Selected {
+struct SelectedTraces {
     traces: Vec<PathBuf>,
-    /// Number of traces left out because they are cut off or damaged.
+    /// Number of traces that are excluded because they are cut off or damaged.
     n_cut: usize,
-    /// Contents of all traces of the run.
-    contents: Contents,
+    /// Helpers, tasks and agents of all traces of the run.
+    contents: TraceContents,
 }
 
 /// Helpers, tasks and agents of traces.
 #[derive(Default)]
-struct Contents {
+struct TraceContents {
     helpers: BTreeSet<String>,
     tasks: BTreeSet<&'static str>,
     agents: BTreeSet<&'static str>,
 }
 
-impl Contents {
+impl TraceContents {
     fn add(&mut self, header: &Header) {
         self.helpers.insert(header.helper.clone());
         self.tasks.insert(header.task.name());
@@ -170,10 +170,14 @@ impl Contents {
     }
 }
 
-/// Says what a run has instead of the traces to export.
-fn nothing_selected(arguments: &LeRobotArguments, n_cut: usize, contents: &Contents) -> String {
+/// Returns an error message that describes which traces a run has instead of the requested ones.
+fn nothing_selected(
+    arguments: &LeRobotArguments,
+    n_cut: usize,
+    contents: &TraceContents,
+) -> String {
     let LeRobotArguments { agent, helper, task, .. } = arguments;
-    let Contents { helpers, tasks, agents } = contents;
+    let TraceContents { helpers, tasks, agents } = contents;
     if n_cut > 0 {
         let cut = counted(n_cut, "trace");
         return format!("no such trace that is whole; {cut} cut off or damaged");
@@ -199,10 +203,11 @@ fn select(
     arguments: &LeRobotArguments,
     folder: &RunFolder,
     options: &RunOptions,
-) -> Result<Selected> {
+) -> Result<SelectedTraces> {
     let LeRobotArguments { run, agent, helper, task, .. } = arguments;
     let helpers = RecordedHelpers::new(run, options)?;
-    let mut selected = Selected { traces: Vec::new(), n_cut: 0, contents: Contents::default() };
+    let mut selected =
+        SelectedTraces { traces: Vec::new(), n_cut: 0, contents: TraceContents::default() };
     let (traces, left_out) = traces_of_plan(folder, options)?;
     left_out.iter().for_each(|warning| print_warning(warning));
     for path in traces {

@@ -94,7 +94,7 @@ fn play(
     experiment: &ExperimentFolder,
     stop: &AtomicBool,
 ) -> Result<bool> {
-    let mut pace = Pace { jobs, ..Pace::default() };
+    let mut estimate = TimeEstimate { jobs, ..TimeEstimate::default() };
     for (k, part) in requested.iter().enumerate() {
         let (folder, mut run) = (experiment.folder(part), open(experiment, part)?);
         let extent = run.progress();
@@ -104,14 +104,14 @@ fn play(
             print_progress(&format!("{name}: {runs}, finished already"));
             continue;
         }
-        pace.remaining = remaining_runs(experiment, &requested[k..])?;
+        estimate.remaining = remaining_runs(experiment, &requested[k..])?;
         let total = counted(extent.total, "episode run");
         print_progress(&format!("{name}: {} of {total}", extent.finished));
         let mut bars = RunBars::for_part(&run, &name);
         let played = run.play(jobs, &BuiltInHelpers, stop, &mut |event| {
             if let JobEvent::Finished(finished) = event {
-                pace.add(&finished.result.key.helper, finished.time);
-                let left = time_left(pace.left());
+                estimate.add(&finished.result.key.helper, finished.time);
+                let left = time_left(estimate.remaining_time());
                 bars.set_suffix(format!(", about {left} for all parts"));
             }
             bars.show(event);
@@ -134,7 +134,7 @@ fn open(experiment: &ExperimentFolder, part: &ExperimentPart) -> Result<Run> {
 
 /// Checks that this build plays like the one that started the runs of both rule sets.
 ///
-/// It does nothing if there are no results to compare, or if no episode run is missing.
+/// The check is skipped if there are no results to compare, or if no episode run is missing.
 fn check_build(
     experiment: &ExperimentFolder,
     requested: &[ExperimentPart],
@@ -166,9 +166,10 @@ fn remaining_runs(
     Ok(remaining)
 }
 
-/// Times of finished episode runs, and counts of remaining ones.
+/// Data for an estimate of the remaining time: times of finished episode runs, and counts of
+/// remaining ones.
 #[derive(Default)]
-struct Pace {
+struct TimeEstimate {
     jobs: usize,
     /// Count and total time of finished episode runs by helper.
     finished: BTreeMap<String, (u32, Duration)>,
@@ -176,7 +177,7 @@ struct Pace {
     remaining: BTreeMap<String, u32>,
 }
 
-impl Pace {
+impl TimeEstimate {
     fn add(&mut self, helper: &str, time: Duration) {
         let (n, sum) = self.finished.entry(helper.to_owned()).or_default();
         (*n, *sum) = (*n + 1, *sum + time);
@@ -186,7 +187,7 @@ impl Pace {
     }
 
     /// Estimates the remaining time from the mean time of each helper, or of all helpers.
-    fn left(&self) -> Duration {
+    fn remaining_time(&self) -> Duration {
         let (n, sum) =
             self.finished.values().fold((0, Duration::ZERO), |(n, sum), t| (n + t.0, sum + t.1));
         let overall = sum / n.max(1);

@@ -19,8 +19,8 @@ pub(super) struct GivenPartners {
 }
 
 impl GivenPartners {
-    /// Reads the file of a partner and returns the partner's name in runs, which has a digest in place of
-    /// the path. Other names are returned unchanged.
+    /// Reads the file of a partner and returns the partner's name in runs, which contains a digest
+    /// instead of the path. Other names are returned unchanged.
     ///
     /// # Errors
     /// If the path is missing, or a file can't be read or is of another kind.
@@ -50,7 +50,8 @@ pub(super) fn is_partner_file(name: &str) -> bool {
     PARTNER_FILES.iter().any(|prefix| name.starts_with(prefix))
 }
 
-/// Refuses to continue runs without their list if a partner comes from a file, which only the list names.
+/// Refuses to continue runs without their list of partners if a partner comes from a file. Only the list
+/// contains the path.
 ///
 /// # Errors
 /// [`EvalError::Options`] with the first such partner.

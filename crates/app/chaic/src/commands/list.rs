@@ -215,7 +215,7 @@ fn runs(folder: &Path, format: OutputFormat) -> Result<()> {
 /// Progress and options of a run.
 struct RunRow {
     finished: usize,
-    /// 0 if the episodes of the run are gone.
+    /// Number of planned episode runs; 0 if the episode files of the run no longer exist.
     planned: usize,
     split: String,
     tasks: Vec<&'static str>,

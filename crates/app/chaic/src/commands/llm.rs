@@ -110,7 +110,8 @@ pub fn language(
 ) -> Result<Option<LanguageHelpers>> {
     check_names(arguments)?;
     let given = &arguments.language;
-    // Options that are not given are those of the resumed run. An unreadable folder fails later.
+    // A resumed run supplies the options that are not given. If its folder is unreadable, a later
+    // step reports the error.
     let recorded_run = arguments.resume.then(|| RunFolder::read(path).ok()).flatten();
     let recorded_run = recorded_run.map(|(_, options)| options);
     let named_helpers = arguments.helper_names();
@@ -179,7 +180,7 @@ pub(super) fn check_partner(name: &str) -> Result<(), EnvError> {
 pub fn resume_options(given: &LanguageArguments) -> String {
     let LanguageArguments { endpoint, llm } = given;
     let EndpointArguments { endpoint, model, llm_key_env, llm_allow_http, llm_config } = endpoint;
-    // A configuration file replaces all recorded settings, also the model.
+    // A configuration file replaces all recorded settings, including the model.
     let model = model.clone().filter(|_| llm_config.is_some());
     let option = |name: &str, value: Option<String>| {
         value.map_or(String::new(), |value| format!(" {name} {}", quoted(&value)))

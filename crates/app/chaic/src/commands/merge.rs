@@ -26,7 +26,7 @@ pub fn run(arguments: &MergeArguments, format: OutputFormat) -> Result<ExitStatu
         print_warning(&format!("{runs} of {} missing", extent.total));
     }
     if extent.finished > 0 {
-        // The merge has written the other files of the report.
+        // `merge` has already written the other files of the report.
         let report = report_of(&run);
         write_report(run.folder(), &report, &shown_language(run.folder().path()))?;
         print_scores(format, &report, run.folder(), &[])?;

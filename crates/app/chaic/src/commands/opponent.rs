@@ -26,7 +26,7 @@ use crate::exit::ExitStatus;
 use crate::interrupt;
 use crate::output::{OutputFormat, json_path, print_progress, print_result, quoted_path};
 
-/// Largest size of a weight file, bytes.
+/// Maximum size of a weights file, bytes.
 const MAX_BYTES: u64 = 1 << 28;
 
 /// Collects windows and writes them to a file.
@@ -75,7 +75,8 @@ pub fn evaluate(arguments: &OpponentArguments, format: OutputFormat) -> Result<E
     Ok(ExitStatus::Success)
 }
 
-/// Reads an opponent model, or that of a policy which includes one.
+/// Reads an opponent model from its own weights file, or from the weights file of a policy that
+/// includes one.
 fn read_model(path: &Path) -> Result<Arc<OpponentModel>> {
     let bytes = read_user_file(path, MAX_BYTES)?;
     let of_policy = || PolicyWeights::from_bytes(&bytes).ok()?.opponent;

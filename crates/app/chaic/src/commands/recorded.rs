@@ -25,8 +25,9 @@ pub(super) struct RecordedEpisode {
     pub is_whole: bool,
 }
 
-/// Reads and verifies the trace that `find` selects among those of planned episode runs. Prints warnings
-/// about a damaged one. `result` names the missing output if the trace was altered, such as `no video is made`.
+/// Reads and verifies the trace that `find` selects among those of planned episode runs. Prints warnings about
+/// a damaged trace. `result` is the consequence in the error message about an altered trace, such as `no video
+/// is made`.
 ///
 /// # Errors
 /// If the folder is no run, or the trace is missing, unreadable or altered.
@@ -53,8 +54,8 @@ pub(super) fn read_recorded(
     Ok(RecordedEpisode { options, trace, episode, is_whole: warnings.is_empty() })
 }
 
-/// Returns the traces of the episode runs that a run plays, and warnings about the others. If its episodes
-/// are gone, the plan is unknown, and all traces count.
+/// Returns the traces of the episode runs that a run plays, and warnings about the others. If its episode
+/// files no longer exist, the planned episode runs are unknown, and all traces are returned.
 ///
 /// # Errors
 /// If a folder cannot be read.

@@ -59,7 +59,8 @@ pub fn run(arguments: &ReplayArguments, format: OutputFormat) -> Result<ExitStat
     Ok(ExitStatus::from_findings(!is_whole))
 }
 
-/// Returns the detector of the run's helpers if its weights are still there, else the built-in one.
+/// Returns the detector of the run's helpers if its weights file still exists, else the built-in
+/// detector.
 fn detector_of(options: &RunOptions) -> Result<TrainedDetector> {
     match options.perception.as_deref().and_then(weights_of) {
         Some(file) => Ok(read_detector(file)?),

@@ -33,7 +33,7 @@ pub fn run(arguments: &ReportArguments, format: OutputFormat) -> Result<ExitStat
     if (arguments.from_traces || arguments.belief) && !options.traces {
         return Err(EvalError::NoTraces { path: folder.path().to_owned() }.into());
     }
-    // Results are useful even if the episodes of the run are gone.
+    // Results are useful even if the episode files of the run no longer exist.
     let planned = planned(&folder, &options).unwrap_or_else(|e| {
         print_warning(&format!("can't check whether the run is complete: {e}"));
         Vec::new()

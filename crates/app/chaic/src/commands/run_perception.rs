@@ -13,7 +13,7 @@ use chaic_vision::perception_registry::{PerceptionError, perception_from_name};
 
 use crate::arguments::EvalArguments;
 
-/// Returns the perception of a run: as given, or as recorded in a run that is resumed.
+/// Returns the perception of a run: the given one, or the recorded one of a resumed run.
 ///
 /// # Errors
 /// Those of [`perception_by_name`], and if the perception cannot read images of the run's size.
@@ -49,7 +49,7 @@ pub fn perception_by_name(
     })
 }
 
-/// Returns the perception of a finished run, or ground truth if its weights are gone.
+/// Returns the perception of a finished run, or ground truth if its weights file no longer exists.
 ///
 /// Replays do not run agents again and need only the sensors that the agents request.
 pub fn recorded_perception(options: &RunOptions) -> Arc<dyn PerceptionFactory> {

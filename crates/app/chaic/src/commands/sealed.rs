@@ -33,7 +33,7 @@ pub(super) struct SplitSize {
     pub n_partners: usize,
 }
 
-/// Makes a sealed split. A secret that exists is used again, so that an interrupted command can be
+/// Creates a sealed split. An existing secret is reused, so that an interrupted command can be
 /// repeated.
 pub(super) fn seal(
     secret_path: &Path,
@@ -106,7 +106,7 @@ pub(super) fn open(
     if out.is_dir() {
         split.check_folder(out)?;
     }
-    // Other episodes than the committed ones must not remain on the disk, so the check comes first.
+    // The check comes before writing, so that only the committed episodes remain on the disk.
     let stop = interrupt::stop_flag()?;
     let Some(opened) = generate(&split, None, stop)? else {
         return Ok(ExitStatus::Interrupted);

@@ -11,7 +11,7 @@ use crate::arguments::ShowArguments;
 use crate::exit::ExitStatus;
 use crate::output::{OutputFormat, counted, json_path, print_result, print_warning, quoted_path};
 
-/// Split of a run of episode files, as in `run.json`.
+/// Name in `run.json` of the split of a run of episode files.
 const FILES_SPLIT: &str = "files";
 
 /// Prints options, progress and scores of a run.
@@ -63,7 +63,7 @@ pub fn run(arguments: &ShowArguments, format: OutputFormat) -> Result<ExitStatus
 
 /// Counts of episode runs.
 struct Progress {
-    /// 0 if the episodes of the run are gone.
+    /// Number of planned episode runs; 0 if the episode files of the run no longer exist.
     planned: usize,
     finished: usize,
     failed: usize,

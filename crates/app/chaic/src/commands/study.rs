@@ -26,7 +26,7 @@ use crate::output::{OutputFormat, counted, json_path, print_result, print_warnin
 /// Sampling interval of LeRobot data sets, frames, and side of their images, pixels: the defaults of
 /// `chaic export lerobot`.
 const LEROBOT: (u32, u32) = (6, 256);
-/// Largest number of slots that a list of open slots names.
+/// Maximum number of slots in a printed list of open slots.
 const MAX_LISTED: usize = 20;
 
 /// Runs a command for studies.
@@ -184,7 +184,8 @@ fn export_data(arguments: &StudyExportArguments, format: OutputFormat) -> Result
     Ok(ExitStatus::from_findings(report.verified.len() < report.traces))
 }
 
-/// Writes the verified episodes in which people had this seat, without practice, as a LeRobot data set.
+/// Writes the verified episodes in which people played this seat as a LeRobot data set, without
+/// practice episodes.
 fn write_lerobot(
     plan: &StudyPlan,
     verified: &[VerifiedTrial],

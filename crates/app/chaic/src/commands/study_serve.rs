@@ -141,7 +141,8 @@ mod own_helpers {
         Ok(Box::leak(Box::new(CommandRegistry::new(policies, programs, stop)?)))
     }
 
-    /// Adds to the error of a missing helper how to give one. Wrong names of the server are invalid requests too.
+    /// Adds a hint to the error about a missing helper: how to specify it. Also marks errors about wrong host
+    /// names as invalid requests.
     pub(super) fn with_hint(error: ServerError) -> anyhow::Error {
         match error {
             ServerError::HostName(_) | ServerError::NoHostName(_) => invalid(&error.to_string()),
@@ -157,7 +158,7 @@ mod own_helpers {
     }
 }
 
-/// Refuses, since this build has no server.
+/// Returns an error, because this build has no server.
 #[cfg(not(feature = "study-server"))]
 pub fn run(_: &StudyServeArguments, _: OutputFormat, _: &Launcher) -> Result<ExitStatus> {
     anyhow::bail!(

@@ -58,7 +58,7 @@ pub fn run(
 }
 
 fn pack_folder(arguments: &SubmitPackArguments, format: OutputFormat) -> Result<ExitStatus> {
-    // A folder that is no submission is refused before an archive exists.
+    // Refuses a folder that is not a submission, before an archive is written.
     Submission::read(&arguments.folder)?;
     let packed = pack(&arguments.folder, &arguments.out)?;
     let json = json!({
@@ -192,12 +192,12 @@ fn play(
     let mut files = GivenPartners::default();
     let partners = list.map(|list| read_partners(list, &mut files)).transpose()?;
     partners.as_ref().map_or(Ok(()), refuse_language_partners)?;
-    // A wrong folder of episodes leaves no submission behind.
+    // This check comes first, so that a wrong folder of episodes leaves no files.
     tasks_of_files(&arguments.episodes)?;
     let evaluation = Evaluation::at(&arguments.out);
     let submission = evaluation.add_submission(&arguments.submission)?;
     let run = evaluation.run_folder();
-    // The sandbox adds no folder of an installed program that holds one of these paths.
+    // The sandbox makes no folder readable that contains one of these paths.
     let masked: Vec<PathBuf> = [run.clone(), arguments.episodes.clone()]
         .into_iter()
         .chain(list.filter(|list| *list != SUITE).map(PathBuf::from))
@@ -321,7 +321,7 @@ pub(super) fn verify_evaluation(
     evaluation.check_parts()?;
     let runs = evaluation.partner_runs()?;
     let ordinary = runs.first().expect("every evaluation has the run with the ordinary partner");
-    // The runs differ in the partner only, so they have the same helpers.
+    // The runs differ only in the partner, so they have the same helpers.
     let (_, options) = RunFolder::read(ordinary)?;
     let helpers = RecordedHelpers::new(ordinary, &options)?;
     // The verification reports a run that can't be read.

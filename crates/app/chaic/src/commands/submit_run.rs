@@ -109,7 +109,7 @@ impl SubmissionPlayer<'_> {
     }
 
     /// Plays the run in a folder and writes its report. `part` names it among several runs. Returns `None`
-    /// if the user stopped it; a message is printed.
+    /// if the user stopped the run, after printing a message.
     fn play_run(
         &self,
         path: &Path,
@@ -148,7 +148,8 @@ impl SubmissionPlayer<'_> {
         Ok(Some(run.progress()))
     }
 
-    /// Prints the extent of the played runs after some tables. `more` has further fields of the JSON.
+    /// Prints the extent of the played runs after some tables. `more` contains additional fields of
+    /// the JSON output.
     fn print_end(
         &self,
         extent: RunProgress,

@@ -1,7 +1,7 @@
 //! The helper of a submission: a program in the sandbox, a policy or a built-in helper.
 //!
-//! **Invariant:** a submission decides which of its own files are read, and which installed program runs. It
-//! cannot make any other file readable for its helper.
+//! **Invariant:** a submission determines which of its own files its helper reads, and which installed
+//! program runs. It cannot make any other file readable.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -28,7 +28,7 @@ use crate::output::{print_warning, quoted};
 pub(super) struct SandboxOptions<'a> {
     /// Program that starts the stages of the sandbox.
     pub launcher: &'a Launcher,
-    /// Folders that stay empty for the program, and files whose folders are never added for it.
+    /// Folders that appear empty to the program, and files whose folders are never made readable.
     pub masked: &'a [PathBuf],
     /// True if parts of the sandbox may be missing on this system.
     pub allows_partial: bool,
@@ -179,10 +179,10 @@ fn program(
     })
 }
 
-/// Returns the word by which the sandbox finds the installation of a program; empty if the word is a path.
+/// Returns the program name by which the sandbox finds an installed program; empty if the word is a path.
 ///
-/// The sandbox opens every file that a command line names, together with its folder. Words of a submission
-/// could name files of the organizer.
+/// The sandbox opens every file that a command line names, together with its folder. The command line of a
+/// submission could name private files of the organizer.
 fn installed_program(word: &str) -> &str {
     let is_name = word.chars().all(|c| c.is_ascii_alphanumeric() || "._-+".contains(c));
     if is_name && !Path::new(word).exists() { word } else { "" }

@@ -15,7 +15,7 @@ use crate::output::{OutputFormat, counted, json_path, print_result, quoted_path}
 
 /// Largest number of lines of the short report.
 const MAX_LINES: usize = 40;
-/// Largest width of its lines, characters. Only paths and commands of the user may be longer.
+/// Maximum width of a line, characters. Only lines with paths or commands may be longer.
 const MAX_COLUMNS: usize = 100;
 /// Width of the column of helpers.
 const HELPER_COLUMNS: usize = 11;
@@ -28,7 +28,7 @@ const TASKS_PER_BLOCK: usize = (MAX_COLUMNS - HELPER_COLUMNS) / (TASK_COLUMNS + 
 pub fn report_of(run: &Run) -> Report<'_> {
     let (options, planned) = (run.options(), run.planned());
     let (results, granted, formulas) = (run.results(), Some(run.granted()), FormulaSet::Paper);
-    // A run of another version can't be opened.
+    // A run of another version cannot be opened, so this is the run's version.
     Report { version: CHAIC_VERSION, options, results, planned, granted, formulas }
 }
 
@@ -40,7 +40,7 @@ pub fn scores_json(report: &Report<'_>) -> Result<Value> {
     Ok(serde_json::from_str(&report.text(Format::Json))?)
 }
 
-/// Value of a further line of the short report.
+/// Value of an additional line of the short report.
 pub enum LineValue {
     /// A path, which the text quotes for a shell.
     Path(PathBuf),
@@ -186,8 +186,8 @@ fn split_title(title: &str) -> [String; 2] {
     [first.to_owned(), second.to_owned()]
 }
 
-/// Splits a long name into two lines of the column of helpers, at a space if both parts fit, and shortens a
-/// longer one.
+/// Splits a long name into two lines of the column of helpers, at a space if both parts fit. Shortens a
+/// name that does not fit into two lines.
 fn wrapped_name(name: &str) -> [String; 2] {
     let fits = |text: &str| text.chars().count() <= HELPER_COLUMNS;
     if fits(name) {

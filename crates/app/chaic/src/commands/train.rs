@@ -127,7 +127,8 @@ fn train<T: Trainer>(
             Phase::Validation => bar.suspend(|| {
                 let s = start.elapsed().as_secs();
                 print_progress(&format!("step {}, {s} s: {metrics}", record.step));
-                // The training continues without the figure: the curves file has all metrics.
+                // A failed plot does not stop the training, because the curves file has all
+                // metrics.
                 if let Err(e) = draw_curves(&arguments.out) {
                     print_error(&format!("{e:#}"));
                 }
@@ -167,7 +168,7 @@ fn open<T: Trainer>(
     Ok(TrainingRun::start(&arguments.out, &config, weights, progress, stop)?)
 }
 
-/// Draws the curves of a training into its folder.
+/// Plots the learning curves of a training into its folder.
 fn draw_curves(folder: &Path) -> Result<()> {
     let text = String::from_utf8(read_bounded(&folder.join(CURVES), MAX_BYTES)?)?;
     let mut curves: BTreeMap<(Phase, String), Vec<(f64, f64)>> = BTreeMap::new();

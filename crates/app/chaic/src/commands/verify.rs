@@ -18,7 +18,7 @@ use crate::arguments::VerifyArguments;
 use crate::exit::ExitStatus;
 use crate::output::{OutputFormat, counted, json_path, print_result, print_warning};
 
-/// Replays the traces of a run, or a single trace, and compares all that is recorded.
+/// Replays the traces of a run, or a single trace, and compares all recorded values.
 pub fn run(arguments: &VerifyArguments, format: OutputFormat) -> Result<ExitStatus> {
     if arguments.run.is_file() {
         return verify_file(&arguments.run, format);
@@ -62,7 +62,7 @@ fn text(verdict: &VerificationReport) -> String {
 /// Verifies the runs of all partners, and that they differ in the partner only.
 fn verify_partners(arguments: &VerifyArguments, format: OutputFormat) -> Result<ExitStatus> {
     let folder = SuiteFolder::read(&arguments.run)?;
-    // Each run reports its own incomplete records.
+    // Incomplete records are reported when each run is verified below.
     let (runs, _) = folder.runs()?;
     let findings = folder.findings(&runs)?;
     let mut is_good = findings.is_empty();
@@ -93,7 +93,7 @@ fn verify_partners(arguments: &VerifyArguments, format: OutputFormat) -> Result<
 fn verify_file(path: &Path, format: OutputFormat) -> Result<ExitStatus> {
     let (trace, warnings) = trace_file::read(path)?;
     warnings.iter().for_each(|warning| print_warning(&warning.to_string()));
-    // The file names the episode, not the caller.
+    // The trace names the episode; the caller does not.
     let episode = find_episode(&trace.header.episode)
         .map_err(|problem| anyhow::anyhow!("{}: {problem}", path.display()))?;
     let mismatch = verify(&trace, &episode, path)?;

@@ -160,7 +160,7 @@ fn an_interrupted_replay_leaves_no_torn_video() {
         let message = text(&ended.stderr);
         assert_eq!(message.contains("r.gif is not written"), code.is_some(), "{message}");
         assert_eq!(fs::read(at.join(&out)).expect("it exists"), b"an older one");
-        // Ctrl-C leaves the older file alone.
+        // Ctrl-C does not change the older file.
         let left = files(&at.join(format!("video{signal}")));
         assert_eq!(left.len(), if code.is_some() { 1 } else { 2 }, "{left:?}");
     }

@@ -127,7 +127,7 @@ fn shards_with_several_partners_are_merged() {
         }
     }
     assert!(run_err(at, &["merge", "--out", "merged", "a", "b"]).contains("isn't empty"));
-    // Other parts are not merged into it.
+    // Shards of other runs are not merged into this folder.
     fs::remove_file(at.join("merged/robustness.md")).expect("it exists");
     assert!(run_err(at, &["merge", "--out", "merged", "a"]).contains("isn't empty"));
     let refused = run_err(at, &["merge", "--out", "c", "a", "whole/rules"]);

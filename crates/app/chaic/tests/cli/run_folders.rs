@@ -318,7 +318,7 @@ mod traps {
         let at = dir.path();
         let journal = at.join("run/results.jsonl");
         fs::rename(&journal, at.join("mine")).expect("it exists");
-        // A torn record; resuming removes it.
+        // An incomplete record, which resuming removes.
         fs::write(at.join("mine"), "dear").expect("the disk has space");
         symlink(at.join("mine"), &journal).expect("the disk has space");
         let message = run_err(at, &["eval", "--resume", "--out", "run"]);

@@ -130,7 +130,7 @@ fn a_helper_reads_files_of_its_command_line_and_those_the_user_adds() {
     let message = fs::read_to_string(run.join("results.jsonl")).expect("it exists");
     assert!(message.contains("weights-are-here"), "{message}");
     assert!(!is_whole(&run) || !message.contains("renderer"), "{message}");
-    // So does the folder of the episodes.
+    // The folder of the episodes stays hidden, too.
     let spy = "exec:ls short >&2; cat data/weights >&2; exit 1";
     let readable = ["--exec-read", "short", "--exec-read", "data"];
     output_of(dir.path(), &play(spy, "hidden", &readable));

@@ -99,7 +99,7 @@ fn a_sealed_split_is_played_and_opened_by_its_secret_alone() {
     assert!(card.contains(&format!("# chaic episodes: {name}\n\nInitial states of 2")), "{card}");
     assert!(card.contains("--episodes DIR") && at.join("set/croissant.json").is_file(), "{card}");
 
-    // Partners that are not committed would be played with the split.
+    // The folder's partners.json is not in this commitment, but would be played with the split.
     let refused = run_err(at, &[&seal[..], &["--n-episodes", "1", "--out", "sealed"]].concat());
     assert!(refused.contains("partners.json belongs to another split"), "{refused}");
 

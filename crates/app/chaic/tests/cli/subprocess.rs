@@ -77,7 +77,7 @@ fn a_run_is_not_resumed_with_an_edited_script() {
     let resume = ["eval", "--resume", "--out", "run"];
     let status = |words: &[&str]| output_of(at, &[words, &helper[..]].concat()).status.code();
     assert_eq!(status(&play), Some(1));
-    // Not there at the start: the helper may have written it.
+    // This file did not exist at the start of the run, so the helper may have written it.
     fs::write(at.join("out.log"), "").expect("the disk has space");
     assert_eq!(status(&resume), Some(1), "failed episode runs are played again");
     write("exit 2\n");

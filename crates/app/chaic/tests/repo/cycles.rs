@@ -290,7 +290,7 @@ fn imports(modules: &Crate) -> Imports {
     found
 }
 
-/// Returns the modules that can be reached from `start`.
+/// Returns the modules that `start` imports, directly or indirectly.
 fn reachable<'a>(imports: &'a Imports, start: &'a ItemPath) -> BTreeSet<&'a ItemPath> {
     let mut found = BTreeSet::new();
     let mut open = vec![start];

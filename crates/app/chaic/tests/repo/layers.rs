@@ -1,5 +1,5 @@
-//! Promise: crates depend on each other only along the edges of ARCHITECTURE.md, which lead to the own or an earlier
-//! layer. Agents in particular cannot depend on the world or the renderer.
+//! Promise: crates depend on each other only along the edges of ARCHITECTURE.md, which lead to the same or an
+//! earlier layer. Agents in particular cannot depend on the world or the renderer.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -9,7 +9,8 @@ use serde_json::{Value, json};
 
 use crate::{cargo_metadata, root, sources};
 
-/// The folders of `crates/` in order. A crate depends on its own layer and on earlier ones.
+/// The folders of `crates/` in order. A crate may depend on crates of its own layer and of earlier
+/// layers.
 const LAYERS: [&str; 7] = ["core", "sim", "render", "agents", "learn", "eval", "app"];
 /// The folder of crates that only tests, benches and examples use.
 const DEV: &str = "dev";
@@ -200,7 +201,7 @@ fn a_wrong_dependency_is_found() {
         with("chaic-env", "chaic-eval", json!("dev"), &map),
         ["the tests of env may not depend on eval"]
     );
-    // A row of the map does not permit what the layers forbid.
+    // The layers forbid this edge even if the code map has a row for it.
     let mut lax = architecture();
     lax.get_mut("env").expect("a row").uses.insert("eval".into());
     assert_eq!(
@@ -270,7 +271,7 @@ fn no_code_depends_on_the_name_of_a_task() {
         for path in found {
             let code = code(&path);
             let known = names.iter().find(|task| code.contains(&format!("TaskId::{task}")));
-            // These build a house without a task from one of an arbitrary task.
+            // These files build a house without a task from the setup of an arbitrary task.
             let file = path.to_string_lossy().replace('\\', "/");
             let is_exempt = ["episodes/src/house/crowded.rs", "import/src/house.rs"]
                 .iter()

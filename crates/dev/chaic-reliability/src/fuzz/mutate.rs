@@ -16,11 +16,11 @@ pub enum Format {
     Binary,
 }
 
-/// Longest input, bytes: longer ones only cost time.
+/// Maximum size of an input, bytes. Larger inputs only cost time.
 const MAX_BYTES: usize = 1 << 20;
-/// Most changes of one input.
+/// Maximum number of changes of one input.
 const MAX_CHANGES: usize = 4;
-/// Levels of nested arrays: more than parsers of JSON accept.
+/// Nesting depth of arrays: more than JSON parsers accept.
 const DEEP: usize = 200;
 
 /// Returns a changed copy of `input`, which may take a part of `other`.

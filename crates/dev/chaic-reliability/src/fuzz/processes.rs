@@ -1,4 +1,5 @@
-//! Fuzzing of several parsers at the same time, each in a process of its own: memory is that of one parser.
+//! Fuzzing of several parsers in parallel, each in its own process, so that the measured memory is that of
+//! one parser.
 
 use std::collections::BTreeMap;
 use std::path::Path;

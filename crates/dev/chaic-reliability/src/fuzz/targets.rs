@@ -44,15 +44,15 @@ use super::import;
 use super::inputs::{self, Inputs, KIND};
 use super::mutate::Format;
 
-/// Longest simulation of a parsed trace, frames.
+/// Maximum length of the simulation of a parsed trace, frames.
 const MAX_FRAMES: usize = 60;
 /// Start of the body of a checkpoint, bytes; its digest lies before.
 const CHECKPOINT_HEAD: usize = MAGIC.len() + 4;
 /// Size of a block of the tar format, bytes.
 const TAR_BLOCK: usize = 512;
-/// Digits of the size of an entry in its header.
+/// Octal digits of an entry's size in its header.
 const TAR_SIZE: Range<usize> = 124..135;
-/// Checksum of a header, which counts as spaces in the sum.
+/// Checksum of a header. Its own bytes count as spaces in the sum.
 const TAR_CHECKSUM: Range<usize> = 148..156;
 
 /// Parser with its inputs.
@@ -211,7 +211,8 @@ fn training_config(_: &Inputs, bytes: &[u8]) -> Result<(), String> {
     let Some(errors) = parsed.into_iter().map(Result::err).collect::<Option<Vec<String>>>() else {
         return Ok(());
     };
-    // The message of the training that the input fits best; any of several lines is a fault.
+    // Returns the message of the training that fits the input best. A message of several lines has
+    // priority, because it is a fault.
     let score = |error: &String| (error.contains('\n'), !error.contains("unknown field"));
     Err(errors.into_iter().max_by_key(score).unwrap_or_default())
 }

@@ -52,7 +52,7 @@ pub struct LabeledWindow {
     pub episode: u32,
 }
 
-/// Maximum number of windows per goal; [`MAX_WINDOW_BYTES`] allows fewer of all goals together.
+/// Maximum number of windows per goal. [`MAX_WINDOW_BYTES`] limits the total number further.
 pub const MAX_WINDOWS: u32 = 1_000_000;
 /// Maximum memory of the windows of a collection, and maximum size of a file of windows, bytes. Reading
 /// a file takes three times its size.
@@ -75,7 +75,7 @@ pub struct WindowCollectionConfig {
     pub max_per_class: usize,
     /// Maximum number of episodes.
     pub episodes: usize,
-    /// Tasks, whose episodes take turns.
+    /// Tasks, used in turn for successive episodes.
     pub tasks: Vec<TaskId>,
     /// Width and height of all agents' images, pixels.
     pub image_size: u32,
@@ -119,7 +119,7 @@ impl WindowCollectionConfig {
         perception.check_image_size(self.image_size)
     }
 
-    /// Checks that the windows fit in memory, whatever the episodes give.
+    /// Checks that the maximum number of windows fits in memory.
     ///
     /// # Errors
     /// One line that describes the problem.
@@ -255,7 +255,7 @@ fn windows_of_episode(
     let log: Arc<Mutex<Vec<LabeledWindow>>> = Arc::default();
     let truth = GroundTruth { partner_plan, limits: limits(&capability), episode: index };
     let grants = perception.grants(Grants { behavior: config.granted, ..Grants::PLANNER });
-    let recording = Recording { perception, grants, truth, log: Arc::clone(&log) };
+    let recording = RecorderParts { perception, grants, truth, log: Arc::clone(&log) };
     let helper = if helper_is_random {
         recording.into_helper(RandomPolicy::default())
     } else {
@@ -310,7 +310,8 @@ impl Policy for PlanReporter {
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
         let plan = self.policy.choose(context, valid)?;
         let current = self.reconsidered.take();
-        // The agent goes on with a plan that the new one does not supersede.
+        // If the new plan does not supersede the current plan, the agent continues the current
+        // plan.
         match current.filter(|current| !self.policy.supersedes(&plan, current)) {
             Some(current) => self.report(current, 0),
             None => self.report(plan, context.memory.frame + self.policy.thinking_frames()),
@@ -341,17 +342,17 @@ struct GroundTruth {
     episode: u32,
 }
 
-/// Data that a recording helper has besides its policy.
-struct Recording<'a> {
+/// Parts of a recording helper except for its policy.
+struct RecorderParts<'a> {
     perception: &'a dyn PerceptionFactory,
     grants: Grants,
     truth: GroundTruth,
     log: Arc<Mutex<Vec<LabeledWindow>>>,
 }
 
-impl Recording<'_> {
+impl RecorderParts<'_> {
     fn into_helper<P: Policy>(self, policy: P) -> Helper {
-        let Recording { perception, grants, truth, log } = self;
+        let RecorderParts { perception, grants, truth, log } = self;
         let window = ObservationHistory::default();
         let recording_policy = RecordingPolicy { policy, window, briefing: None, truth, log };
         let agent = PlanningAgent::with_watched(
@@ -421,7 +422,7 @@ const GRANTED: &str = "granted";
 /// (5), `episode`. The rows of `choices` (38 features) are the candidates of all windows in order.
 ///
 /// The metadata `granted` says whether the partner's actions were granted, so that a model is not
-/// trained or evaluated with the wrong ones.
+/// trained or evaluated with windows of the wrong kind.
 ///
 /// # Errors
 /// If the file cannot be written.
@@ -497,9 +498,9 @@ pub(super) fn read_with_digest(
     Ok((parse_granted(path, &bytes, is_granted)?, Digest::of_bytes(&bytes)))
 }
 
-/// Refuses a file of more than [`MAX_WINDOW_BYTES`]. Reading would cut it off.
+/// Refuses a file larger than [`MAX_WINDOW_BYTES`], because reading would truncate it.
 fn check_size(path: &Path) -> Result<(), CollectError> {
-    // Reading reports a file without metadata.
+    // If the size cannot be determined, the later read reports the error.
     let n = fs::metadata(path).map_or(0, |metadata| metadata.len());
     if n <= MAX_WINDOW_BYTES {
         return Ok(());

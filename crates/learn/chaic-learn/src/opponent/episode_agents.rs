@@ -5,7 +5,8 @@ use chaic_core::rng::RngStream;
 /// Fraction of the episodes whose partner pauses before each plan. Partners that follow the rules never
 /// wait.
 const WAITING_FRACTION: f32 = 0.25;
-/// Fraction of the episodes with a random helper, as in the paper. RHP stays closer to its partner.
+/// Fraction of the episodes with a random helper, as in the paper. The other helper, RHP, stays
+/// closer to its partner.
 const RANDOM_FRACTION: f32 = 0.5;
 
 /// Agents of an episode.

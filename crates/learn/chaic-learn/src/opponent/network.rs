@@ -21,7 +21,8 @@ pub(crate) const OPPONENT: &str = "opponent";
 /// Width of the hidden layers.
 const WIDTH: usize = 96;
 
-/// Creates the network architecture. Candidates are the classes that the partner may be after.
+/// Creates the network architecture. Candidates are the classes that the partner may want to pick
+/// up.
 pub fn network() -> CandidateScorer {
     CandidateScorer::new(N_STATE, N_CLASS, WIDTH, N_GOALS + N_LIMITS)
 }
@@ -29,7 +30,7 @@ pub fn network() -> CandidateScorer {
 /// Opponent model whose predictions a policy reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OpponentInput {
-    /// None.
+    /// No opponent model.
     None,
     /// A model that sees the partner's actions.
     Observed,
@@ -38,7 +39,7 @@ pub enum OpponentInput {
 }
 
 impl OpponentInput {
-    /// All of them.
+    /// All kinds of input.
     pub const ALL: [OpponentInput; 3] =
         [OpponentInput::None, OpponentInput::Observed, OpponentInput::Granted];
 
@@ -100,8 +101,8 @@ pub struct OpponentModel {
     is_granted: bool,
 }
 
-/// Returns the kind in weights files of models whose windows have the partner's actions as granted,
-/// or as seen.
+/// Returns the kind in weights files, for models that get the partner's actions as a grant or from
+/// observation.
 pub fn kind(is_granted: bool) -> &'static str {
     KINDS[usize::from(is_granted)]
 }
@@ -111,7 +112,7 @@ impl OpponentModel {
     /// seen.
     ///
     /// # Panics
-    /// If their number differs from that of the network.
+    /// If the number of parameters differs from that of the network.
     pub fn new(parameters: Vec<f32>, is_granted: bool) -> OpponentModel {
         let network = network();
         assert_eq!(parameters.len(), network.network.n_parameters());

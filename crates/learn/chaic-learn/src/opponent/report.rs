@@ -33,7 +33,8 @@ pub struct OpponentReport {
     /// Mean squared error of each limit; `None` without windows.
     #[serde(rename = "error_of_limit")]
     pub error_by_limit: BTreeMap<&'static str, Option<f64>>,
-    /// Confusion matrix (rows: truth), in the order of [`OpponentGoal::ALL`].
+    /// Confusion matrix (rows: true goal, columns: predicted goal), in the order of
+    /// [`OpponentGoal::ALL`].
     pub confusion: [[usize; N_GOALS]; N_GOALS],
     /// Expected calibration error of the goal probabilities over ten bins; `None` without windows.
     pub calibration_error: Option<f64>,
@@ -122,7 +123,7 @@ impl OpponentReport {
     }
 }
 
-/// Returns the index of the maximum, the first of equal ones.
+/// Returns the index of the maximum; the lowest index wins ties.
 fn argmax(values: &[f32]) -> usize {
     let mut best = 0;
     for (k, x) in values.iter().enumerate() {

@@ -45,7 +45,7 @@ impl OpponentTracker {
         self.model.predict(&window, &mut self.pass)
     }
 
-    /// Returns the predicted probability that the partner is after objects of this class.
+    /// Returns the predicted probability that the partner wants to pick up objects of this class.
     pub fn target_probability(&self, prediction: &OpponentPrediction, class: ClassId) -> f32 {
         let index = self.history.classes().iter().position(|c| *c == class);
         index.map_or(0.0, |k| prediction.targets[k])

@@ -58,8 +58,9 @@ pub struct OpponentConfig {
     /// Maximum number of validation windows per goal.
     #[serde(alias = "validation_of_each")]
     pub validation_max_per_class: usize,
-    /// Fraction of the training windows that validate instead of windows of other episodes. Windows of
-    /// one episode resemble each other, so the figures are then too good.
+    /// Fraction of the training windows that is held out for validation, instead of windows of other
+    /// episodes. Windows of one episode are similar, so the validation metrics are then too
+    /// optimistic.
     pub held_out_fraction: f32,
     /// Optimizer.
     pub adam: AdamWConfig,
@@ -101,7 +102,7 @@ const DATA_SETTINGS: &str = "data.json";
 const MAX_SETTINGS_BYTES: u64 = 1 << 16;
 
 impl OpponentConfig {
-    /// Returns the values of the keys that decide about training and validation windows.
+    /// Returns the values of the keys that determine the training and validation windows.
     fn data_settings(&self) -> Settings {
         let collect = serde_json::to_value(&self.collect).expect("a configuration serializes");
         let collect = collect.as_object().into_iter().flatten();
@@ -111,7 +112,7 @@ impl OpponentConfig {
         insert("held_out_fraction", self.held_out_fraction.to_string());
         insert("validation_max_per_class", self.validation_max_per_class.to_string());
         if self.held_out_fraction > 0.0 {
-            // It draws the windows that are held out.
+            // The seed selects the held-out windows.
             insert("seed", self.seed.to_string());
         }
         settings
@@ -186,7 +187,7 @@ pub struct OpponentTrainer {
     learner: Learner,
     steps: u64,
     samples: Vec<LabeledWindow>,
-    /// Indices of samples by goal, so that goals are drawn uniformly.
+    /// Indices of samples by goal. Batches draw a goal uniformly, then a sample of this goal.
     by_goal: Vec<Vec<usize>>,
     validation: Vec<LabeledWindow>,
     /// Digest of the file that `windows` names, if any.

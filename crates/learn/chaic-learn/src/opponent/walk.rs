@@ -1,8 +1,8 @@
 //! Current walk of the partner, and how well each place explains it.
 //!
-//! A person who walks to a place follows a short path. The detour over the present position tells
-//! likely destinations from unlikely ones (inverse planning). The constants are ours and not tuned,
-//! since a learned model weighs the features.
+//! A person who walks to a place follows a short path. The detour over the present position
+//! distinguishes likely from unlikely destinations (inverse planning). The constants are chosen by
+//! hand and not tuned, because a learned model weights the features.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -26,15 +26,15 @@ const MAX_STILL_FRAMES: Frame = 45;
 const MAX_UNSEEN_FRAMES: Frame = 120;
 /// Range in which the partner notices objects in any direction, meters (as in the belief of `infer`).
 const NOTICE_M: f32 = 5.0;
-/// Range in which it notices objects ahead, and all around during its first turn, meters: small
-/// objects are hardly visible beyond.
+/// Range in which the partner notices objects ahead, and in all directions during its first full
+/// turn, meters. Beyond it, small objects are hardly visible.
 const NOTICE_AHEAD_M: f32 = 10.0;
 /// Cosine of half the camera's view angle.
 const AHEAD_COS: f32 = 0.7;
-/// End of the turn with which the partner begins, frames.
+/// End of the full turn with which the partner begins an episode, frames.
 const FIRST_TURN_END: Frame = 60;
-/// People stand within these distances of the middle of an object that they use, meters: beside small
-/// objects and tables, and beside a truck.
+/// Maximum distances between a person and the middle of the object that the person uses, meters:
+/// first for small objects and tables, then for a truck.
 const BESIDE_M: [f32; 2] = [1.5, 4.0];
 /// Minimum length by which progress is divided, meters.
 const MIN_WALK_M: f32 = 0.3;
@@ -52,7 +52,8 @@ pub struct PartnerWalk {
     /// Objects that the partner has been near, or walked towards, without a wall between.
     noticed: BTreeSet<TrackId>,
     map: Option<WalkMap>,
-    /// Path costs from the start of the walk, and the version of the costs of the map that they are on.
+    /// Path costs from the start of the walk, and the version of the map costs from which they were
+    /// computed.
     from_start: Option<(CostField, u32)>,
 }
 
@@ -206,8 +207,8 @@ pub struct Destination {
     pub initial_m: f32,
     /// Shortest path to the place, meters.
     pub remaining_m: f32,
-    /// Length by which the way over the present position exceeds the shortest path from the start
-    /// of the walk, meters.
+    /// Detour, meters: the length of the path over the present position minus the shortest path
+    /// from the start of the walk.
     pub detour_m: f32,
     /// Decrease of the remaining path per length of the walk, -1 to 1.
     pub progress: f32,
@@ -220,7 +221,7 @@ impl WalkPaths {
     }
 }
 
-/// Returns objects that are believed to rest where they were last seen.
+/// Returns the objects that probably still rest where they were last seen.
 pub(super) fn resting_objects(memory: &Memory) -> impl Iterator<Item = &MappedObject> {
     memory
         .objects
@@ -245,7 +246,7 @@ mod tests {
 
     use crate::test_support::start;
 
-    /// Otherwise the features would depend on the frames at which the model was asked.
+    /// Otherwise the features would depend on the frames at which the model was queried.
     #[test]
     fn both_ends_of_a_walk_are_on_the_present_map() {
         let (briefing, _) = start(TaskId::LowTarget);

@@ -1,5 +1,5 @@
 //! Input of the opponent model: five consecutive observations of a helper, encoded as features of
-//! the partner and of each class that the partner may be after.
+//! the partner and of each class that the partner may want to pick up.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -130,7 +130,7 @@ pub struct ObservationHistory {
     walk: PartnerWalk,
     /// Belief about the partner's goal.
     belief: Option<Belief>,
-    /// Top of objects when they were last seen at rest, meters.
+    /// Height of the top of each object when it was last seen at rest, meters.
     tops_m: BTreeMap<TrackId, f32>,
 }
 
@@ -147,7 +147,7 @@ impl ObservationHistory {
         *self = ObservationHistory { classes, belief, ..ObservationHistory::default() };
     }
 
-    /// Returns the classes that the partner may be after, in the order of the candidates.
+    /// Returns the classes that the partner may want to pick up, in the order of the candidates.
     pub fn classes(&self) -> &[ClassId] {
         &self.classes
     }

@@ -30,7 +30,7 @@ pub struct PartnerDecision {
     pub action: usize,
     /// Index of the plan that the rules choose; `None` if it is no candidate.
     pub rules_action: Option<usize>,
-    /// True if a target is chosen: the plan is to pick it up, and there are others.
+    /// True if the partner picks up one of several targets.
     pub is_pick: bool,
 }
 
@@ -42,7 +42,7 @@ pub type DecisionLog = Arc<Mutex<Vec<PartnerDecision>>>;
 pub enum Demonstrator {
     /// Partner with these habits.
     Habits(PartnerHabits),
-    /// Partner that repeats a recorded one.
+    /// Partner that repeats the actions of a recorded partner.
     Recorded(Recording),
 }
 
@@ -95,7 +95,7 @@ fn demonstrator<P: Policy>(expert: P, log: DecisionLog) -> Helper {
     Helper { agent, grants: partner_grants(rules) }
 }
 
-/// Policy that records the choices of another one, with those of the rules for comparison.
+/// Policy that records the choices of another policy, and for comparison those of the rules.
 struct DemonstratorPolicy<P> {
     expert: P,
     rules: PartnerVariantPolicy,
@@ -122,7 +122,8 @@ impl<P: Policy> Policy for DemonstratorPolicy<P> {
         let candidates = self.encoder.candidates(valid);
         let plan = self.expert.choose(context, valid)?;
         let rules_plan = self.rules.choose(context, valid)?;
-        // A plan that does not supersede the current one continues it.
+        // If the new plan does not supersede the current plan, the partner continues the current
+        // plan.
         let continued = |policy: &dyn Fn(&Plan, &Plan) -> bool, plan: Plan| {
             reconsidered.filter(|current| !policy(&plan, current)).unwrap_or(plan)
         };

@@ -87,7 +87,8 @@ const SPEED_SCALE: f32 = 0.1;
 /// Scale of heights, meters.
 const HEIGHT_SCALE_M: f32 = 2.0;
 
-/// Encoder of a partner's choices, with the history that its memory lacks.
+/// Encoder of a partner's choices. It also keeps the history, which the partner's memory does not
+/// contain.
 #[derive(Clone, Debug, Default)]
 pub struct PartnerEncoder {
     /// Last chosen plan that was not continued.
@@ -99,7 +100,7 @@ pub struct PartnerEncoder {
 }
 
 impl PartnerEncoder {
-    /// Unfinished plan that the next choice reconsiders, if any.
+    /// Returns the unfinished plan that the next choice reconsiders, if any.
     pub fn reconsidered(&self) -> Option<Plan> {
         self.reconsidered
     }
@@ -133,7 +134,7 @@ impl PartnerEncoder {
 
     /// Encodes a choice among these candidates.
     pub fn encode(&self, context: &Context<'_>, candidates: &[Plan]) -> CandidateSet {
-        let choice = Choice::new(context, self);
+        let choice = ChoiceContext::new(context, self);
         let wanted: Vec<&Plan> = candidates.iter().filter(|plan| choice.is_wanted(plan)).collect();
         let mut has_kind = [false; N_KINDS];
         let mut features = Vec::with_capacity(candidates.len() * N_PARTNER_PLAN);
@@ -154,18 +155,18 @@ impl PartnerEncoder {
 }
 
 /// Data that all plans of a choice share.
-struct Choice<'a> {
+struct ChoiceContext<'a> {
     context: &'a Context<'a>,
     encoder: &'a PartnerEncoder,
     hands: HandState,
-    /// Classes that are delivered or carried, with repetitions.
+    /// Class of each delivered or carried object; a class may occur several times.
     done: Vec<ClassId>,
     goal_place: Option<(Vec3, f32)>,
     helper: Option<Vec3>,
 }
 
-impl<'a> Choice<'a> {
-    fn new(context: &'a Context<'a>, encoder: &'a PartnerEncoder) -> Choice<'a> {
+impl<'a> ChoiceContext<'a> {
+    fn new(context: &'a Context<'a>, encoder: &'a PartnerEncoder) -> ChoiceContext<'a> {
         let Context { briefing, memory, .. } = context;
         let hands = HandState::new(&memory.hands, briefing);
         let mut done: Vec<ClassId> =
@@ -175,7 +176,7 @@ impl<'a> Choice<'a> {
         let goal_place = places.first().map(|(place, m)| (place.position_in_world, *m));
         let helper = memory.companion(briefing, CompanionRole::Partner);
         let helper = helper.map(|person| person.position_in_world);
-        Choice { context, encoder, hands, done, goal_place, helper }
+        ChoiceContext { context, encoder, hands, done, goal_place, helper }
     }
 
     fn n_missing(&self, class: ClassId) -> u32 {

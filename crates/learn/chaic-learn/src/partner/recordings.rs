@@ -8,15 +8,16 @@ use chaic_env::recording::Recordings;
 use chaic_env::trace::MAX_TRACE_BYTES;
 use chaic_files::{EntryKind, FileError, read_bounded, read_user_file, walk};
 
-/// Levels of folders below the given one: those of a run (`traces/TASK/HELPER`) and one more.
+/// Maximum depth of folders below the given folder: three levels of a run (`traces/TASK/HELPER`)
+/// and one more.
 const MAX_DEPTH: u32 = 4;
 /// Extension of traces.
 const EXTENSION: &str = "jsonl";
 
-/// Reason why recordings can't be read.
+/// Reason why recordings cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
-    /// The file system refuses.
+    /// A file cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
     /// A file is no recording.

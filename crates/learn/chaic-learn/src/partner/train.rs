@@ -42,7 +42,7 @@ use crate::rollout_config::{
 const ITERATIONS: &str = "partner.iterations";
 /// Validation metric by which weights are selected: mean log-likelihood of the demonstrated choices, nats.
 const LOG_LIKELIHOOD: &str = "log_likelihood";
-/// One of this many recordings validates.
+/// Every fifth recording is used for validation.
 const VALIDATION_INTERVAL: usize = 5;
 
 /// Configuration of `chaic train partner`.
@@ -55,22 +55,23 @@ pub struct PartnerCloningConfig {
     pub iterations: u64,
     /// Episodes that each iteration plays.
     pub episodes: usize,
-    /// Tasks, whose episodes take turns.
+    /// Tasks, used in turn for successive episodes.
     pub tasks: Vec<TaskId>,
-    /// Generators whose episodes take turns: `gen` and `gen-standard`.
+    /// Generators, used in turn for successive episodes: `gen` and `gen-standard`.
     pub splits: Vec<String>,
-    /// Helpers, which take turns: `none` or the name of a built-in one.
+    /// Helpers, used in turn: `none` or the name of a built-in one.
     pub helpers: Vec<String>,
     /// Trace or folder of traces whose partners are imitated, each in its episode. Without it, partners
     /// with drawn habits are imitated in generated episodes.
     pub recordings: Option<PathBuf>,
     /// Width and height of all agents' images, pixels.
     pub image_size: u32,
-    /// Validation episodes per task. With recordings, every fifth recording validates instead.
+    /// Validation episodes per task. With recordings, every fifth recording is used for validation
+    /// instead.
     pub validation_episodes: usize,
     /// Maximum number of episodes whose demonstrations are kept, the latest ones.
     pub max_episodes: usize,
-    /// Probability that the labels spread evenly over all candidates.
+    /// Label smoothing: probability mass that is spread evenly over all candidates.
     pub label_smoothing: f32,
     /// Optimizer steps per iteration.
     pub n_steps: usize,
@@ -112,9 +113,9 @@ impl Default for PartnerCloningConfig {
     }
 }
 
-/// Part of the recordings or of the generated episodes.
+/// Training or validation part of the recordings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Part {
+enum RecordingPart {
     Training,
     Validation,
 }
@@ -174,7 +175,7 @@ impl PartnerCloningConfig {
         stop: &AtomicBool,
     ) -> Option<Vec<DemonstrationEpisode>> {
         if let Some(recordings) = recordings {
-            let recordings = part_of(recordings, Part::Validation);
+            let recordings = part_of(recordings, RecordingPart::Validation);
             return Some(recordings.iter().map(|recording| self.recorded(recording)).collect());
         }
         let split = self.splits.last().map_or(GENERATORS[0], String::as_str);
@@ -192,10 +193,10 @@ impl PartnerCloningConfig {
 }
 
 /// Returns one part of the recordings.
-fn part_of(recordings: &Recordings, part: Part) -> Vec<Recording> {
+fn part_of(recordings: &Recordings, part: RecordingPart) -> Vec<Recording> {
     let is_held_out = |k: usize| k.is_multiple_of(VALIDATION_INTERVAL);
     let all = recordings.iter().enumerate();
-    let chosen = all.filter(|(k, _)| is_held_out(*k) == (part == Part::Validation));
+    let chosen = all.filter(|(k, _)| is_held_out(*k) == (part == RecordingPart::Validation));
     chosen.map(|(_, recording)| recording.clone()).collect()
 }
 
@@ -209,7 +210,7 @@ fn check_episode(recording: &Recording) -> Result<(), String> {
         return Ok(());
     }
     let id = &recording.episode;
-    Err(format!("`recordings` has {id} of another version; use the chaic that wrote it"))
+    Err(format!("`recordings` contains {id} of another version; use the chaic that wrote it"))
 }
 
 /// Trainer of a partner's policy.
@@ -286,7 +287,7 @@ impl Trainer for PartnerCloningTrainer {
         let Some(validation) = config.validation_episodes(all.as_ref(), stop) else {
             return Ok(None);
         };
-        let recordings = all.as_ref().map(|all| part_of(all, Part::Training));
+        let recordings = all.as_ref().map(|all| part_of(all, RecordingPart::Training));
         // The name of the recordings contains the digest of their contents.
         let input = all.map(|all| Digest::of_bytes(all.to_string().as_bytes()));
         let model = partner_network();
@@ -317,7 +318,7 @@ impl Trainer for PartnerCloningTrainer {
         }
         let all = config.read_recordings().map_err(|e| e.to_string())?;
         let Some(all) = all else { return Ok(()) };
-        for part in [Part::Training, Part::Validation] {
+        for part in [RecordingPart::Training, RecordingPart::Validation] {
             let recordings = part_of(&all, part);
             if recordings.is_empty() {
                 return Err("`recordings` has a single recording, expected two or more".to_owned());
@@ -416,7 +417,7 @@ impl Trainer for PartnerCloningTrainer {
             let Some(played) = played.expect("validation episodes can be played") else {
                 return Ok(None);
             };
-            // Another value would be the same.
+            // If another thread has set the value, it is equal.
             let _ = self.validation_decisions.set(played.into_iter().flatten().collect());
         }
         let decisions = self.validation_decisions.get().expect("it was set above");
@@ -424,8 +425,9 @@ impl Trainer for PartnerCloningTrainer {
     }
 }
 
-/// Returns the mean log-likelihood of choices, nats, and how often network, rules and the nearest wanted
-/// target agree with them: among all choices, and among choices of a target.
+/// Returns the mean log-likelihood of the demonstrated choices, nats, and three accuracies: of the
+/// network, of the rules, and of taking the nearest wanted target. The accuracies are over all choices,
+/// and over choices of a target.
 fn imitation_metrics(
     model: &CandidateScorer,
     parameters: &[f32],

@@ -20,7 +20,8 @@ use crate::rollout_config::{ROLLOUT_BOUNDS, RolloutConfig};
 
 /// Maximum memory of all demonstrations, bytes: 16 GiB.
 const MAX_DEMONSTRATION_BYTES: u64 = 1 << 34;
-/// Memory of the demonstrations of an episode, and of each earlier decision that they hold, bytes.
+/// Memory of the demonstrations of an episode, and additional memory per past decision that they
+/// contain, bytes.
 const EPISODE_BYTES: u64 = 100_000;
 const PAST_DECISION_BYTES: u64 = 45_000;
 
@@ -58,8 +59,8 @@ pub struct CloningConfig {
     pub learner_fraction: f32,
     /// Maximum number of episodes whose demonstrations are kept, the latest ones.
     pub max_episodes: usize,
-    /// Probability that the labels spread evenly over all candidates. It leaves a policy for
-    /// reinforcement learning some exploration.
+    /// Label smoothing: probability mass that is spread evenly over all candidates. It preserves
+    /// some exploration for later reinforcement learning.
     pub label_smoothing: f32,
     /// Discount factor per frame of the returns that the value head regresses.
     #[serde(alias = "discount")]

@@ -22,8 +22,8 @@ pub enum ActionSpace {
     Primitives,
 }
 
-/// Kinds of plans, those of the original's interface for learners. Its eighth kind, to wait, always
-/// explores there.
+/// Kinds of plans, those of the original's interface for learners. The original's eighth kind,
+/// wait, always explores.
 pub const PLANS: [&str; 7] = [
     "pick_up_target",
     "pick_up_container",
@@ -47,7 +47,7 @@ pub const PRIMITIVES: [&str; 9] = [
     "wait",
 ];
 
-/// Duration of a wait, and of an action that cannot begin, frames: about that of a turn.
+/// Duration of a wait, and of an action that cannot begin, frames: about the duration of a step.
 const WAIT_FRAMES: u32 = 10;
 /// Wait that replaces an action that cannot begin.
 pub(crate) const PAUSE: Action = Action::Wait { frames: WAIT_FRAMES };

@@ -32,9 +32,9 @@ pub struct VisualConfig {
     /// Decisions of each environment between updates.
     #[serde(alias = "rollout")]
     pub n_steps: usize,
-    /// Tasks, whose episodes take turns. The paper trains one policy per task.
+    /// Tasks, used in turn for successive episodes. The paper trains one policy per task.
     pub tasks: Vec<TaskId>,
-    /// Generators whose episodes take turns, as in `[rollout]` of the other trainings.
+    /// Generators, used in turn for successive episodes, as in `[rollout]` of the other trainings.
     pub splits: Vec<String>,
     /// Weights of an opponent model (`chaic train opponent`) whose predictions the policy reads, if
     /// any (Smart-Help).

@@ -87,7 +87,7 @@ impl EnvRunner {
     }
 
     /// Takes a decision and advances to the next one or the end, at most the duration of a plan (1,000
-    /// frames). After the end the observation is outdated.
+    /// frames). After the end of the episode, the stored observation is outdated.
     fn act(
         &mut self,
         action_index: usize,
@@ -179,8 +179,8 @@ impl EnvRunner {
     }
 }
 
-/// Encodes the last observation. Draws its color image, which plans in progress do not need, unless the
-/// perception has already asked for it.
+/// Encodes the last observation. Renders its color image, unless the perception has already requested
+/// it. Plans in progress need no color image.
 fn encode(encoder: &mut ObservationEncoder, env: &mut Env) -> Option<VisualObservation> {
     let drawn = (!encoder.sensors().rgb).then(|| env.render_color(AgentId::HELPER));
     let observation = env.observe(AgentId::HELPER)?;

@@ -35,7 +35,7 @@ pub struct VisualWeights {
     pub parameters: Vec<f32>,
     /// Opponent model whose predictions are inputs, if the network has such inputs.
     pub opponent: Option<Arc<OpponentModel>>,
-    /// Digest of the weights file, if they are from one.
+    /// Digest of the weights file, if the parameters come from a file.
     pub digest: Option<String>,
 }
 
@@ -76,7 +76,7 @@ impl VisualPolicies {
     /// Combines policies of single tasks.
     ///
     /// # Errors
-    /// The first task whose policy has other inputs or actions than that of the first one.
+    /// The first task whose policy has other inputs or actions than the policy of the first task.
     pub fn by_task(
         policies: impl IntoIterator<Item = (TaskId, VisualWeights)>,
     ) -> Result<VisualPolicies, TaskId> {
@@ -103,7 +103,7 @@ impl VisualPolicies {
         self.find(Some(task)).is_some()
     }
 
-    /// Returns the policy for an episode of this task, which is unknown without the grant.
+    /// Returns the policy for an episode of this task; `task` is `None` without the grant.
     fn find(&self, task: Option<TaskId>) -> Option<&Arc<VisualWeights>> {
         match self {
             VisualPolicies::AllTasks(weights) => Some(weights),
@@ -136,7 +136,8 @@ pub(crate) struct ObservationEncoder {
 }
 
 impl ObservationEncoder {
-    /// Creates an encoder with this perception and opponent model; returns its grants too.
+    /// Creates an encoder with this perception and opponent model. Also returns the grants that it
+    /// needs.
     pub(crate) fn new(
         rules: PlannerRules,
         perception: &dyn PerceptionFactory,
@@ -290,7 +291,7 @@ impl VisualHelper {
 
 impl Agent for VisualHelper {
     fn sensors(&self) -> SensorConfig {
-        // The environment draws before a decision is known to be due.
+        // The environment renders before it is known whether a decision is due.
         SensorConfig { rgb: true, ..self.encoder.sensors() }
     }
 

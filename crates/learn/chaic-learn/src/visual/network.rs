@@ -128,7 +128,7 @@ impl VisualNetwork {
         self.action_space
     }
 
-    /// Returns the network of this kind in weights files, if there is one. The classes may be other ones.
+    /// Returns the network of this kind in weights files, if there is one. The classes may differ.
     pub fn from_kind(name: &str) -> Option<VisualNetwork> {
         let name = without_class_digest(name);
         let kinds =
@@ -169,8 +169,8 @@ fn joint_log_probs(logits: &[f32], head_sizes: &[usize]) -> Vec<f32> {
     joint
 }
 
-/// Adds up gradients with respect to joint logits to those with respect to the logits of each
-/// independent choice: the reverse of [`joint_log_probs`].
+/// Sums gradients with respect to the joint logits into gradients with respect to the logits of
+/// each independent choice: the backward pass of [`joint_log_probs`].
 fn sum_by_head(joint: &[f32], head_sizes: &[usize], sums: &mut [f32]) {
     let mut first = 0;
     let mut n_later: usize = head_sizes.iter().product();
@@ -295,8 +295,8 @@ mod tests {
         assert_eq!(sums, [3.0, 7.0, 11.0, 9.0, 12.0]);
     }
 
-    /// The bundled weights are older than the digest of the classes; loading them checks only how
-    /// many there are.
+    /// The bundled weights are older than the digest of the classes, so loading checks only the
+    /// number of classes.
     #[test]
     fn the_classes_are_those_of_the_bundled_weights_in_their_order() {
         let names: Vec<&str> = classes().iter().map(|class| class.info().name).collect();

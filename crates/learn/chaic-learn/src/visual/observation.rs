@@ -57,7 +57,7 @@ pub struct VisualObservation {
 }
 
 /// Number of features of an opponent model's prediction: goals, limits, and the probability that
-/// the partner is after the nearest visible target's class.
+/// the partner wants the class of the nearest visible target.
 pub const N_OPPONENT: usize = N_GOALS + N_LIMITS + 1;
 
 /// Returns a prediction as bytes, 0 to 255 for 0 to 1.

@@ -151,7 +151,7 @@ impl Trainer for VisualTrainer {
         let model =
             VisualNetwork::new(config.action_space, OpponentInput::from_model(opponent.as_ref()));
         let mut parameters = model.read(weights)?;
-        // The rollouts use the model of the configuration, whatever the weights contain.
+        // Rollouts use the opponent model of the configuration, not the one in the weights file.
         if let (Some(range), Some(opponent)) = (model.opponent_range(), &opponent) {
             parameters[range].copy_from_slice(opponent.parameters());
         }
@@ -159,7 +159,7 @@ impl Trainer for VisualTrainer {
     }
 
     fn fixed_keys() -> Vec<&'static str> {
-        // The first decides about the network, the others about the replayed episodes.
+        // The first key determines the network, the other keys determine the replayed episodes.
         vec![
             "action_space",
             "seed",
@@ -322,7 +322,8 @@ fn read_progress(
     let n_total = usize::try_from(n_actions.iter().fold(0, |sum: u64, n| sum.saturating_add(*n)));
     let n_total = n_total.map_err(|_| CheckpointError::section(N_ACTIONS, "is too large"))?;
     let indices = checkpoint.integers(ACTION_INDICES, n_total)?;
-    // Every action, and every episode but the first, takes a decision.
+    // Each recorded action is one decision, and an environment starts at most one episode per
+    // decision.
     let n_decisions = updates * config.n_steps as u64;
     if let Some(n) = episode_counts.iter().find(|n| **n > n_decisions) {
         return Err(CheckpointError::section(EPISODES, format!("has {n}")));

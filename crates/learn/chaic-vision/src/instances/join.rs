@@ -1,13 +1,13 @@
-//! Joining of the parts of one object by their centers. A grid keeps the search short for images in
-//! which each pixel is a part of its own, such as noise.
+//! Joining of the parts of one object by their centers. A grid keeps the search fast for images in
+//! which each pixel is a separate part, such as noise.
 
 use std::collections::BTreeMap;
 
 use super::Segment;
 
 /// Joins each part to the first earlier segment that `is_same` accepts; other parts become segments.
-/// `reach_m` bounds the distance between the center of a segment and that of a part that joins it,
-/// meters.
+/// `reach_m` is the maximum distance between the center of a segment and the center of a part that
+/// joins the segment, meters.
 pub(super) fn join(
     parts: Vec<Segment>,
     reach_m: impl Fn(&Segment) -> f32,
@@ -29,7 +29,7 @@ pub(super) fn join(
 }
 
 /// Numbered centers, each listed in all cells within its reach. A cell is at least twice the reach of
-/// its centers. Segments of one label exclude each other, so a cell lists few per label.
+/// its centers. Segments of one label are far apart, so a cell lists few segments per label.
 #[derive(Default)]
 struct CenterGrid {
     levels: Vec<Level>,

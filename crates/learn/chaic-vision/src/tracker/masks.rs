@@ -8,13 +8,14 @@ use chaic_core::{ClassId, Hand, Vec2, Vec3};
 use super::plan_extent::PlanExtent;
 use super::{Track, Tracker, extents_m, pixel_kind};
 
-/// Half extents of an unknown object, meters. A fire extinguisher, 1.06 m high, was taken for a pen.
+/// Half extents of an unknown object, meters. The detector once labeled a fire extinguisher, 1.06 m
+/// high, as a pen.
 const UNKNOWN_M: Vec3 = Vec3::new(0.25, 0.55, 0.25);
 
 impl Tracker {
     /// Sets a mask where the image shows held objects, regardless of their detected class: shape
-    /// [height / stride, width / stride], rounded up. An object may be larger than the class for which
-    /// it was taken; in the static map it would block the way wherever the agent goes.
+    /// [height / stride, width / stride], rounded up. An object may be larger than its detected class.
+    /// In the static map, a held object would block the path wherever the agent goes.
     pub fn mask_held(
         &self,
         pose: Pose,
@@ -112,7 +113,7 @@ impl Tracker {
     }
 }
 
-/// True if a point in the world's frame is inside of one of the boxes in a body's frame.
+/// Returns whether a point (world frame) lies inside one of the boxes (body frame).
 pub(super) fn is_within(boxes: &[(Vec3, Vec3)], point: Vec3, body: Pose) -> bool {
     let p = rotate_yaw(point - body.position, -body.yaw_rad);
     boxes.iter().any(|(at, half)| (p - *at).abs().cmplt(*half).all())

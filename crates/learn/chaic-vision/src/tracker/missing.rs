@@ -7,12 +7,12 @@ use chaic_core::geom::Camera;
 
 use super::{Track, Tracker, depths_at, extents_m};
 
-/// Depths differ by at least this much between the points of an object, meters.
+/// Minimum tolerance of the depth of an object, meters: the depths of its points differ.
 const MIN_DEPTH_ERROR_M: f32 = 0.05;
 
 impl Tracker {
     /// Returns one pixel of each track that was missed in this image although the depth at its place
-    /// is that of the object. The pixel targets it like a detection.
+    /// is that of the object. An action can target the object by this pixel, as by a detection.
     pub fn missed(&self, now: Frame, depth_m: &[f32], camera: &Camera) -> Vec<(TrackId, [u32; 2])> {
         let is_missed =
             |t: &&Track| t.last_seen < now && t.is_at_rest() && !self.held.contains(&t.id);

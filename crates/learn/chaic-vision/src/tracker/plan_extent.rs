@@ -1,5 +1,5 @@
 //! Horizontal extent of an object's visible points, for the association of large objects: the mean of
-//! the visible points depends on the view, the union of all views does not exceed the object.
+//! the visible points depends on the view, but the union of all views does not exceed the object.
 
 use chaic_core::Vec2;
 

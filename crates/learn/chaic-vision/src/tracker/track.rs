@@ -1,4 +1,4 @@
-//! Evidence and place of one track.
+//! Evidence and position of one track.
 
 use chaic_agents::perception::SegmentMeasurement;
 use chaic_core::{Frame, Vec2};
@@ -10,7 +10,8 @@ use crate::loss::{exp, ln, sigmoid};
 
 /// Probability of each label that a detection does not name.
 const UNNAMED: f32 = 0.001;
-/// An object near a person that moved by less lies where it was, meters: nobody holds it.
+/// Maximum displacement at which an object near a person counts as unmoved, so that the person does
+/// not hold it, meters.
 const UNMOVED_M: f32 = 0.15;
 
 impl Track {
@@ -35,8 +36,8 @@ impl Track {
         sigmoid(self.log_odds) * self.probability(self.label)
     }
 
-    /// True if it is assumed to be where it was last seen: nobody carries it, and the agent has not
-    /// released it since.
+    /// Returns whether the object probably is where it was last seen: no person carries it, and the
+    /// agent has not released it since.
     pub(super) fn is_at_rest(&self) -> bool {
         !self.is_carried && !self.is_released
     }

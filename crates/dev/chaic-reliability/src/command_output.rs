@@ -1,13 +1,13 @@
-//! Ends of commands.
+//! Exit code and output of commands.
 
 /// Exit code of a command that reports findings on its standard output.
 const FINDINGS: i32 = 1;
 /// Exit code of a program that panicked.
 const PANICKED: i32 = 101;
 
-/// End of a command.
+/// Exit code and output of a command.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Ended {
+pub struct CommandOutput {
     /// Exit code; `None` after a signal.
     pub code: Option<i32>,
     /// Standard output.
@@ -16,8 +16,8 @@ pub struct Ended {
     pub stderr: String,
 }
 
-impl Ended {
-    /// Returns what is wrong with the end of any command: a panic, or an exit code without one line of
+impl CommandOutput {
+    /// Returns the problem that no command may have: a panic, or an exit code without one line of
     /// explanation. Findings on the standard output explain exit code 1 only.
     pub fn problem(&self) -> Option<String> {
         let n_errors = self.stderr.lines().filter(|line| line.starts_with("error:")).count();

@@ -43,10 +43,11 @@ mod submit_run;
 mod submitted;
 mod summary;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use chaic_episodes::{Episode, find_episode};
+use chaic_eval::run::{RunFolder, RunOptions, planned, planned_traces};
 use chaic_eval::{EvalError, read_episode_file};
 use chaic_files::write_atomically;
 use chaic_learn::bundled::{BundledHelper, BundledPartner};
@@ -120,6 +121,18 @@ fn write_json(path: Option<&Path>, report: &impl Serialize) -> Result<()> {
         write_atomically(path, json.as_bytes())?;
     }
     Ok(())
+}
+
+/// Returns the traces of the episode runs that a run plays, and warnings about the others. If its episode
+/// files no longer exist, the planned episode runs are unknown, and all traces are returned.
+///
+/// # Errors
+/// If a folder cannot be read.
+fn traces_of_plan(
+    folder: &RunFolder,
+    options: &RunOptions,
+) -> Result<(Vec<PathBuf>, Vec<String>), EvalError> {
+    planned_traces(folder, &planned(folder, options).unwrap_or_default())
 }
 
 /// Reports that a command without partial results was stopped, and returns its exit status.

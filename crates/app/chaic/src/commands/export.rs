@@ -15,8 +15,8 @@ use chaic_export::episodes::EpisodeSetWriter;
 use chaic_export::lerobot::{LeRobotOptions, LeRobotWriter};
 use serde_json::json;
 
-use super::recorded::{RecordedHelpers, traces_of_plan};
-use super::{bars, stopped_without_result};
+use super::recorded::RecordedHelpers;
+use super::{bars, stopped_without_result, traces_of_plan};
 use crate::arguments::{EpisodesArguments, ExportCommand, LeRobotArguments};
 use crate::exit::ExitStatus;
 use crate::interrupt;

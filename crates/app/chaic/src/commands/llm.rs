@@ -20,8 +20,7 @@ use chaic_llm::{check, record, session};
 use serde_json::{Value, json};
 
 use super::given_partners::is_partner_file;
-use super::recorded::traces_of_plan;
-use super::{all_helper_names, all_partner_names, require_text};
+use super::{all_helper_names, all_partner_names, require_text, traces_of_plan};
 use crate::arguments::{EndpointArguments, EvalArguments, LanguageArguments, LlmCommand};
 use crate::exit::ExitStatus;
 use crate::output::{OutputFormat, json_path, print, print_result, print_warning, quoted};

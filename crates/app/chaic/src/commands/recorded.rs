@@ -8,12 +8,12 @@ use chaic_env::helper_registry::{BuiltInWithPerception, HelperRegistry};
 use chaic_env::trace::Trace;
 use chaic_episodes::Episode;
 use chaic_eval::EvalError;
-use chaic_eval::run::{RunFolder, RunOptions, planned, planned_traces};
+use chaic_eval::run::{RunFolder, RunOptions};
 use chaic_eval::verify::verify_trace;
 use chaic_learn::helpers::PolicyRegistry;
 use chaic_llm::LanguageHelpers;
 
-use super::{llm, run_perception};
+use super::{llm, run_perception, traces_of_plan};
 use crate::output::print_warning;
 
 /// A trace whose records equal those of a re-simulation.
@@ -52,18 +52,6 @@ pub(super) fn read_recorded(
     }
     let episode = folder.episode(&options, &trace.header.key())?;
     Ok(RecordedEpisode { options, trace, episode, is_whole: warnings.is_empty() })
-}
-
-/// Returns the traces of the episode runs that a run plays, and warnings about the others. If its episode
-/// files no longer exist, the planned episode runs are unknown, and all traces are returned.
-///
-/// # Errors
-/// If a folder cannot be read.
-pub(super) fn traces_of_plan(
-    folder: &RunFolder,
-    options: &RunOptions,
-) -> Result<(Vec<PathBuf>, Vec<String>), EvalError> {
-    planned_traces(folder, &planned(folder, options).unwrap_or_default())
 }
 
 /// Helpers of a run that was played, except helper processes and policies from files.

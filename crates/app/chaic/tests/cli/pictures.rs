@@ -83,13 +83,19 @@ fn a_page_to_play_and_single_traces() {
     let message = text(&output.stderr);
     assert!(message.contains("absent.jsonl: no episode `low_target/test/99`"), "{message}");
     assert_eq!(output.status.code(), Some(1), "{message}");
+    // Such a trace is altered at the place of a planned one, and otherwise no part of the run.
     let path = at.join(trace);
-    fs::write(path.with_file_name("test-99-s0.jsonl"), absent).expect("written");
-    fs::remove_file(path).expect("it exists");
-    let output = output_of(at, &["explain", "run", "low_target/test/99"]);
-    let message = text(&output.stderr);
-    assert!(message.contains("the trace was altered, so it is not explained"), "{message}");
-    assert_eq!(output.status.code(), Some(1), "{message}");
+    fs::write(path.with_file_name("test-99-s0.jsonl"), &absent).expect("written");
+    fs::write(path, absent).expect("written");
+    for (episode, problem) in [
+        ("low_target/test/00", "the trace was altered, so it is not explained"),
+        ("low_target/test/99", "run has no trace of low_target/test/99"),
+    ] {
+        let output = output_of(at, &["explain", "run", episode]);
+        let message = text(&output.stderr);
+        assert!(message.contains(problem), "{message}");
+        assert_eq!(output.status.code(), Some(1), "{message}");
+    }
 }
 
 #[test]

@@ -11,10 +11,12 @@
 
 use super::Behavior;
 use super::clip::{Clip, ClipSet, Counts, MIXED};
-use super::network::{BehaviorScores, softmax};
 use crate::loss::ln;
 
 const N: usize = Behavior::ALL.len();
+
+/// One value per behavior: logits or probabilities.
+pub type BehaviorScores = [f32; Behavior::ALL.len()];
 
 /// Calibration of logits.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,4 +83,11 @@ fn prior_correction(found: &Counts, batch_fractions: &BehaviorScores) -> Behavio
         true => ln(counts[k] / total / batch_fractions[k]),
         false => 0.0,
     })
+}
+
+/// Returns the probabilities of logits.
+pub fn softmax(logits: &BehaviorScores) -> BehaviorScores {
+    let mut probabilities = *logits;
+    crate::loss::softmax(&mut probabilities);
+    probabilities
 }

@@ -6,7 +6,7 @@ use chaic_nn::weights::WeightsError;
 use chaic_nn::{Kernel, Network, Node, Pass, Shape, Tensor, weights};
 
 use super::Behavior;
-use super::calibration::Calibration;
+use super::calibration::{BehaviorScores, Calibration};
 use super::clip::{CROPS, ClipAugmentation, N_CHANNELS, fill_input};
 use super::crop::{PersonCrop, SIDE};
 
@@ -150,14 +150,4 @@ impl TrainedBehavior {
     pub fn probabilities(&self, logits: &BehaviorScores) -> BehaviorScores {
         self.calibration.probabilities(logits)
     }
-}
-
-/// One value per behavior: logits or probabilities.
-pub type BehaviorScores = [f32; Behavior::ALL.len()];
-
-/// Returns the probabilities of logits.
-pub fn softmax(logits: &BehaviorScores) -> BehaviorScores {
-    let mut probabilities = *logits;
-    crate::loss::softmax(&mut probabilities);
-    probabilities
 }

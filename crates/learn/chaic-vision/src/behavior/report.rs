@@ -6,8 +6,9 @@ use std::sync::atomic::AtomicBool;
 use serde::Serialize;
 
 use super::Behavior;
+use super::calibration::BehaviorScores;
 use super::clip::{Clip, ClipSet, SLACK};
-use super::network::{BehaviorScores, TrainedBehavior};
+use super::network::TrainedBehavior;
 use crate::calibration::weighted_calibration_error;
 use crate::parallel::map_in_order;
 use crate::track_evaluation::Rate;

@@ -13,14 +13,14 @@ use chaic_training::conformance::{bounds_every_number, refuses_damaged_checkpoin
 use chaic_training::{Checkpoint, Trainer as _, TrainingError, parse_config};
 
 use super::Behavior;
-use super::calibration::Calibration;
+use super::calibration::{BehaviorScores, Calibration, softmax};
 use super::clip::{
     CROPS, Clip, ClipAugmentation, ClipSet, Counts, N_CHANNELS, SLACK, fill_input, is_seen_enough,
 };
 use super::collect::{Collector, collect, with_noise};
 use super::config::ClipCollectionConfig;
 use super::crop::{HISTORY, PersonCrop, PersonCropper, SIDE};
-use super::network::{BehaviorScores, TrainedBehavior, softmax};
+use super::network::TrainedBehavior;
 use super::report::{all_outputs, report, report_of_outputs};
 use super::store::ClipFolder;
 use super::train::{BehaviorLearner, BehaviorTrainer, BehaviorTrainingConfig};

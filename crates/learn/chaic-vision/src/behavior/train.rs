@@ -18,11 +18,11 @@ use serde::{Deserialize, Serialize};
 use chaic_agents::perception_factory::GroundTruthPerceptionFactory;
 
 use super::Behavior;
-use super::calibration::Calibration;
+use super::calibration::{BehaviorScores, Calibration, softmax};
 use super::clip::{Clip, ClipAugmentation, ClipSet, Counts, MIXED, fill_input};
 use super::collect::{Collector, collect};
 use super::config::{COLLECT_BOUNDS, ClipCollectionConfig};
-use super::network::{BehaviorNetwork, BehaviorScores, TrainedBehavior, softmax};
+use super::network::{BehaviorNetwork, TrainedBehavior};
 use super::report::{all_outputs, report_of_outputs};
 use super::store::{ClipFolder, StoreError};
 use crate::loss::ln;

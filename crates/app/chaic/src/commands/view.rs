@@ -10,7 +10,7 @@ use chaic_page::{page, read_replays};
 use serde_json::json;
 
 use super::llm::shown_language;
-use super::recorded::traces_of_plan;
+use super::traces_of_plan;
 use crate::arguments::ViewArguments;
 use crate::exit::ExitStatus;
 use crate::output::{OutputFormat, counted, json_path, print_result, print_warning, quoted_path};

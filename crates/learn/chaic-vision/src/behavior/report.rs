@@ -15,7 +15,8 @@ use crate::track_evaluation::Rate;
 
 const N: usize = Behavior::ALL.len();
 
-/// Accuracy on held-out clips.
+/// Accuracy on held-out clips. Their actions are about as frequent as in training batches, so the accuracy is
+/// that of the network before the correction to the frequencies in play. Values in play include the correction.
 #[derive(Clone, Debug, Serialize)]
 pub struct BehaviorReport {
     /// Number of evaluated clips.
@@ -34,7 +35,8 @@ pub struct BehaviorReport {
     /// Expected calibration error over ten bins, with the clips and frequencies of `top1_in_play`; `None`
     /// without clips.
     pub calibration_error: Option<f64>,
-    /// Fraction of mixed clips that are classified as moving; `None` without mixed clips.
+    /// Fraction of mixed clips that are classified as moving with the frequencies in play; `None` without
+    /// mixed clips.
     pub mixed_as_moving: Option<f64>,
     /// Number of clips by true and predicted behavior.
     pub confusion: BTreeMap<&'static str, BTreeMap<&'static str, usize>>,
@@ -82,11 +84,11 @@ pub fn report_of_outputs(
     outputs: &[BehaviorScores],
 ) -> BehaviorReport {
     let clips = &set.clips;
-    let predictions: Vec<(Behavior, f32)> =
+    let in_play: Vec<(Behavior, f32)> =
         outputs.iter().map(|o| most_probable(&trained.probabilities(o))).collect();
     let scored: Vec<(f32, bool, f64)> = clips
         .iter()
-        .zip(&predictions)
+        .zip(&in_play)
         .zip(set.weights())
         .map(|((clip, (behavior, p)), weight)| (*p, *behavior == clip.label, weight))
         .collect();
@@ -97,12 +99,13 @@ pub fn report_of_outputs(
     // Correct and all clips of each episode.
     let mut by_episode: BTreeMap<u32, [usize; 2]> = BTreeMap::new();
     let mut mixed = [0usize; 2];
-    for (clip, (behavior, _)) in clips.iter().zip(predictions) {
+    for ((clip, output), (behavior_in_play, _)) in clips.iter().zip(outputs).zip(in_play) {
         if clip.is_mixed {
-            mixed[0] += usize::from(behavior == Behavior::Moving);
+            mixed[0] += usize::from(behavior_in_play == Behavior::Moving);
             mixed[1] += 1;
             continue;
         }
+        let (behavior, _) = most_probable(output);
         let is_correct = behavior == clip.label;
         counts[clip.label.index()][behavior.index()] += 1;
         let episode = by_episode.entry(clip.episode).or_default();

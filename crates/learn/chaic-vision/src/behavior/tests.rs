@@ -337,7 +337,7 @@ fn probabilities_are_those_of_play_not_of_training_batches() {
 
 #[test]
 fn a_report_weights_clips_by_their_frequency_in_play() {
-    let trained = BehaviorLearner::new(BehaviorTrainingConfig::default(), Vec::new()).trained();
+    let mut trained = BehaviorLearner::new(BehaviorTrainingConfig::default(), Vec::new()).trained();
     let output = |behavior: Behavior| -> BehaviorScores {
         std::array::from_fn(|k| if k == behavior.index() { 20.0 } else { 0.0 })
     };
@@ -349,6 +349,11 @@ fn a_report_weights_clips_by_their_frequency_in_play() {
     assert!((found.top1_in_play.unwrap() - 58.0 / 94.0).abs() < 1e-9, "{found:?}");
     assert!((found.calibration_error.unwrap() - 36.0 / 94.0).abs() < 1e-3, "{found:?}");
     assert_eq!(found.mixed_as_moving, Some(0.0));
+    // If everything moves in play, helpers report no action. The accuracy of the clips stays the same.
+    trained.calibration.class_bias[Behavior::Moving.index()] = 40.0;
+    let still = report_of_outputs(&trained, &clips_in_play(), &predictions.map(output));
+    assert_eq!((still.top1, still.mixed_as_moving), (found.top1, Some(1.0)), "{still:?}");
+    assert!((still.top1_in_play.unwrap() - 81.0 / 94.0).abs() < 1e-9, "{still:?}");
 }
 
 #[test]

@@ -141,14 +141,14 @@ fn prompts_contain_failed_attempts_that_the_behavior_network_recognizes() {
         response_mode: ResponseMode::Function(Box::new(say)),
         ..Options::default()
     });
-    let episode = ["--task", "high_target", "--split", "gen-standard:5000..5001"];
+    let episode = ["--task", "high_target", "--split", "gen-standard:5019..5020"];
     let options = ["--behavior", "learned", "--size", "128", "--helper", "llm,vlm", "--out", "run"];
     let endpoint = ["--endpoint", &server.url(), "--model", "standin"];
     run_ok(at, &[&["eval"][..], &episode, &options, &endpoint].concat());
     let prompts = prompts.lock().expect("no panic");
     for (helper, prompts) in [("llm", &prompts[0]), ("vlm", &prompts[1])] {
         let trace = at.join("run/traces/high_target").join(helper);
-        let trace = fs::read_to_string(trace.join("gen-standard-5000-s0.jsonl"));
+        let trace = fs::read_to_string(trace.join("gen-standard-5019-s0.jsonl"));
         let trace = trace.expect("a text file");
         let events = trace.lines().map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
         let failed = events.filter_map(|event| {

@@ -53,7 +53,7 @@ pub struct MappedObject {
     pub first_seen: Frame,
     /// Frame of the last sighting.
     pub last_seen: Frame,
-    /// Where the agent stood at the nearest sighting in this place, if there is one.
+    /// Position of the agent at the nearest sighting in this place; `None` before the first one.
     pub seen_from: Option<Vec2>,
     /// The agent ignores it before this frame.
     pub ignore_until: Frame,

@@ -22,7 +22,7 @@ use crate::behavior::BehaviorLog;
 use crate::memory::Memory;
 
 pub use constraint::ConstraintBelief;
-pub use evidence::{AttemptKind, Evidence, FailedAttempt, Take};
+pub use evidence::{AttemptKind, Evidence, FailedAttempt, PickUpEvidence};
 pub use goal::GoalBelief;
 pub use observed_walks::ObservedWalks;
 pub use scene::scene_of;

@@ -38,7 +38,7 @@ enum ChildBehavior {
 
 /// Agent of the child. It knows the positions of all agents.
 #[derive(Clone, Debug)]
-pub struct Child {
+pub struct ChildAgent {
     rules: PlannerRules,
     episode: Option<Episode>,
 }
@@ -57,10 +57,10 @@ struct Episode {
     last_decision: Option<Frame>,
 }
 
-impl Child {
+impl ChildAgent {
     /// Creates a child without an episode.
-    pub fn new(rules: PlannerRules) -> Child {
-        Child { rules, episode: None }
+    pub fn new(rules: PlannerRules) -> ChildAgent {
+        ChildAgent { rules, episode: None }
     }
 }
 
@@ -240,7 +240,7 @@ impl Episode {
     }
 }
 
-impl Agent for Child {
+impl Agent for ChildAgent {
     fn sensors(&self) -> SensorConfig {
         SensorConfig::DEPTH_AND_IDS
     }
@@ -292,7 +292,7 @@ mod tests {
 
     /// A child without camera on an empty plane; the other agents are placed by the test.
     struct Scenario {
-        child: Child,
+        child: ChildAgent,
         observation: Observation,
     }
 
@@ -306,7 +306,7 @@ mod tests {
                 Companion { agent: AgentId::PARTNER, role: CompanionRole::Guardian },
                 Companion { agent: AgentId::HELPER, role: CompanionRole::Partner },
             ];
-            let mut child = Child::new(PlannerRules::paper());
+            let mut child = ChildAgent::new(PlannerRules::paper());
             child.reset(&briefing);
             let mut observation = toy.observe();
             observation.images = Default::default();

@@ -11,7 +11,7 @@ use chaic_core::{AgentError, Briefing, ClassId, Frame, Hand, Observation, Role};
 use crate::behavior::BehaviorLog;
 use crate::mapping::MappedObject;
 use crate::memory::Memory;
-use crate::track::{Carried, Hands, TrackId};
+use crate::track::{CarriedObject, Hands, TrackId};
 
 /// Object that a plan refers to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -163,8 +163,8 @@ impl HandState {
     pub fn new(hands: &Hands, briefing: &Briefing) -> HandState {
         let capacity = briefing.container_capacity;
         let is_target = |class: ClassId| briefing.possible_targets.contains(&class);
-        let role = |held: &Carried| held.class().map(|c| c.info().role);
-        let is_container = |held: &Carried| role(held) == Some(Role::Container);
+        let role = |held: &CarriedObject| held.class().map(|c| c.info().role);
+        let is_container = |held: &CarriedObject| role(held) == Some(Role::Container);
         let basket = hands.held().find(|h| role(h) == Some(Role::Vehicle));
         let moves_furniture =
             briefing.possible_targets.iter().any(|c| c.info().role == Role::HeavyTarget);
@@ -184,7 +184,7 @@ impl HandState {
         };
         // An unidentified object is delivered too, to free the hand.
         let carries =
-            |h: &Carried| h.object.is_none() || h.all().any(|(_, class)| is_target(class));
+            |h: &CarriedObject| h.object.is_none() || h.all().any(|(_, class)| is_target(class));
         HandState {
             free_hand,
             has_container,

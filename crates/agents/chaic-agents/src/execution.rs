@@ -465,3 +465,23 @@ fn time_limit(plan: &Plan, limits: &PlanTimeouts) -> Frame {
         _ => limits.interact_frames,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_support::{Toy, ToyObject, ToyRun};
+
+    #[test]
+    fn a_position_that_does_not_show_a_high_object_is_kept_for_later_plans() {
+        let mut toy = Toy::room(6.0, 6.0);
+        let apple = toy.add(ToyObject::new("apple", [0.0, 2.0, -2.0], [0.1, 0.1, 0.1]));
+        let (rules, state) = (PlannerRules::paper(), toy.state(&[]));
+        let mut executor = Executor::new(&toy.briefing(), &rules);
+        let mut memory = ToyRun::new(toy).observe();
+        memory.needs_view = true;
+        memory.objects.apply_granted_state(&state.objects[0], memory.frame);
+        assert!(!executor.record_unseen(&memory, apple), "no side shows it");
+        executor.start_plan(memory.frame + 1, &rules);
+        assert_eq!(executor.failed_positions, [(apple, memory.position(), memory.frame)]);
+    }
+}

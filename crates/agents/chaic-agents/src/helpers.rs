@@ -67,7 +67,9 @@ pub static HELPERS: [HelperInfo; 11] = [
         name: "infer_no_watching",
         title: "Infer, no watching",
         about: "infer that does not follow the partner",
-        make: |rules, factory| Box::new(infer(rules, factory, InferOptions::NO_WATCHING, false)),
+        make: |rules, factory| {
+            Box::new(infer(rules, factory, InferOptions::WITHOUT_FOLLOWING, false))
+        },
         grants: planner_grants,
     },
     HelperInfo {

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 
-use chaic_core::briefing::{CompanionRole, Motion};
+use chaic_core::briefing::{CompanionRole, MotionParams};
 use chaic_core::capability::Gait;
 use chaic_core::geom::{Pose, Rect, horizontal_distance, to_xz};
 use chaic_core::observation::{Grants, JointCarrier, WorldState};
@@ -59,7 +59,7 @@ pub struct Memory {
     /// Pose of the agent's body.
     pub pose: Pose,
     /// Motion parameters of the body.
-    pub motion: Motion,
+    pub motion: MotionParams,
     /// Static structure.
     pub map: OccupancyMap,
     /// Known objects.
@@ -185,7 +185,7 @@ impl Memory {
         let people_at = if self.rules.sees_held_objects { &in_view[..] } else { &[] };
         self.objects.update(detections, people_at, self.rules.seen_held_ignore_frames, self.frame);
         self.objects.record_viewpoint(to_xz(self.pose.position), self.frame);
-        self.objects.withdraw(&percepts.withdrawn, &briefing.possible_targets);
+        self.objects.retract(&percepts.retracted, &briefing.possible_targets);
         if self.rules.forgets_missing && !percepts.is_reused {
             self.objects.forget_missing(observation);
         }
@@ -263,7 +263,7 @@ impl Memory {
             let track = TrackId::from(object.entity);
             self.classes.insert(track, object.class);
             if object.holder != Some(me) && !own.contains(&track) {
-                self.objects.place(object, self.frame);
+                self.objects.apply_granted_state(object, self.frame);
             }
         }
         self.granted_goal_places = Some(state.goal_places.iter().map(|e| (*e).into()).collect());

@@ -7,7 +7,7 @@ use chaic_core::capability::Persona;
 use chaic_core::observation::Grants;
 use chaic_core::task::SceneKind;
 
-pub use crate::child::Child;
+pub use crate::child::ChildAgent;
 use crate::planning_agent::PlanningAgent;
 pub use crate::policies::{
     FetchOrder, HabitsError, PARTNER_VARIANTS, PartnerHabits, PartnerVariant, partner_habits,
@@ -53,5 +53,5 @@ pub fn partner_grants(rules: PlannerRules) -> Grants {
 
 /// Constructs the agent of the child in the shopping task. It requires [`Grants::CHILD`].
 pub fn child(rules: PlannerRules) -> Box<dyn Agent> {
-    Box::new(Child::new(rules))
+    Box::new(ChildAgent::new(rules))
 }

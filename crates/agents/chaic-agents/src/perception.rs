@@ -5,7 +5,7 @@ mod segments;
 use chaic_core::observation::HeldIdentity;
 use chaic_core::{AgentId, Briefing, ClassId, EntityId, Observation, Outcome, Target, Vec2, Vec3};
 
-use crate::track::{Carried, Hands, Intent, TrackId};
+use crate::track::{CarriedObject, Hands, Intent, TrackId};
 
 pub(crate) use segments::Rays;
 pub use segments::{MIN_PIXELS, OBJECT_RANGE_M, PixelKind, STRIDE, SegmentMeasurement, Segments};
@@ -77,7 +77,7 @@ pub struct Percepts {
     /// image. A missing detection then means nothing.
     pub is_reused: bool,
     /// Tracks of earlier detections whose objects probably do not exist.
-    pub withdrawn: Vec<TrackId>,
+    pub retracted: Vec<TrackId>,
 }
 
 /// Turns images into detections.
@@ -185,7 +185,7 @@ impl GroundTruthIds {
     fn hands(observation: &Observation) -> Option<Hands> {
         let own = &observation.proprioception;
         let is_granted = own.held().all(|held| held.identity.is_some());
-        let carried = |held: &HeldIdentity| Carried {
+        let carried = |held: &HeldIdentity| CarriedObject {
             object: Some((held.entity.into(), held.class)),
             contents: held.contents.iter().map(|(e, class)| ((*e).into(), *class)).collect(),
             n_contents: held.contents.len() as u32,

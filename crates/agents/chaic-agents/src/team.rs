@@ -12,7 +12,7 @@ pub mod search;
 pub mod simulation;
 pub mod travel;
 
-pub use problem::{Operation, Place, PlaceKind, TeamProblem, Worker};
+pub use problem::{Operation, Place, PlaceKind, TeamMember, TeamProblem};
 pub use search::{SearchSettings, search_operations};
 pub use simulation::simulate;
 

@@ -1,11 +1,11 @@
 //! Toy world for tests: boxes in a room, a small ray caster, and one body whose actions never fail
 //! at random.
 
-use chaic_core::briefing::{Companion, CompanionRole, Goal, Layout, LayoutBlock, Motion};
+use chaic_core::briefing::{Companion, CompanionRole, Goal, Layout, LayoutBlock, MotionParams};
 use chaic_core::capability::Persona;
 use chaic_core::geom::{Camera, Pose, Rect, forward, to_xz, wrap_angle, yaw_rotation};
 use chaic_core::observation::{
-    Granted, Grants, Held, HeldIdentity, Images, ObjectState, Proprioception, WorldState,
+    GrantedInfo, Grants, HeldIdentity, HeldObject, Images, ObjectState, Proprioception, WorldState,
 };
 use chaic_core::{
     Action, Agent, AgentId, Briefing, ClassId, EntityId, FailureReason, Frame, Hand, Observation,
@@ -21,10 +21,10 @@ use crate::perception::{Detection, GroundTruthIds, Perception as _};
 use crate::planning::careful_costs::CarefulCosts;
 use crate::planning::cost_map::CostMap;
 use crate::planning::cost_model::{CostInputs, CostModel as _};
-use crate::track::{Carried, Hands, TrackId};
+use crate::track::{CarriedObject, Hands, TrackId};
 
 /// Motion parameters: those of the paper's world rules.
-pub const MOTION: Motion = Motion {
+pub const MOTION: MotionParams = MotionParams {
     turn_rad: std::f32::consts::PI / 12.0,
     stride_m: 0.4,
     step_over_m: 0.12,
@@ -264,7 +264,7 @@ impl Toy {
             }
         }
         let is_joint = matches!(&self.hands, [Some(l), Some(r)] if l.entity == r.entity);
-        let sensed = |held: &HeldIdentity| Held {
+        let sensed = |held: &HeldIdentity| HeldObject {
             n_contents: held.contents.len() as u32,
             in_both_hands: is_joint,
             identity: self.grants_ids.then(|| held.clone()),
@@ -273,10 +273,10 @@ impl Toy {
         let in_view = |e: &EntityId| ids.contains(&e.0);
         let all = (0..self.classes.len()).map(|i| EntityId(i as u16));
         let class = |e: EntityId| Some((e, self.classes[usize::from(e.0)]?));
-        let granted = Granted {
+        let granted = GrantedInfo {
             classes: all.filter(in_view).filter_map(class).collect(),
             delivered: self.delivered.iter().filter_map(|t| class(EntityId(t.0 as u16))).collect(),
-            ..Granted::default()
+            ..GrantedInfo::default()
         };
         Observation {
             frame: self.frame,
@@ -542,9 +542,9 @@ pub fn identity(class: &str, entity: u16, contents: &[&str]) -> HeldIdentity {
 }
 
 /// The same object as known by the agent.
-pub fn carried(class: &str, track: u16, contents: &[&str]) -> Carried {
+pub fn carried(class: &str, track: u16, contents: &[&str]) -> CarriedObject {
     let held = identity(class, track, contents);
-    Carried {
+    CarriedObject {
         object: Some((held.entity.into(), held.class)),
         n_contents: held.contents.len() as u32,
         contents: held.contents.into_iter().map(|(e, class)| (e.into(), class)).collect(),
@@ -552,7 +552,7 @@ pub fn carried(class: &str, track: u16, contents: &[&str]) -> Carried {
 }
 
 /// Creates hands that hold these objects.
-pub fn hands(hands: [Option<Carried>; 2]) -> Hands {
+pub fn hands(hands: [Option<CarriedObject>; 2]) -> Hands {
     Hands { hands, is_joint: false }
 }
 

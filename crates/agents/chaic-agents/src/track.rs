@@ -18,13 +18,13 @@ impl From<EntityId> for TrackId {
 
 impl TrackId {
     /// First id that a perception assigns itself. Smaller ids are entity ids, which may be granted.
-    pub const FIRST_OWN: TrackId = TrackId(1 << 20);
+    pub const FIRST_SELF_ASSIGNED: TrackId = TrackId(1 << 20);
 }
 
 /// Formats an entity as `#31`, and a track assigned by perception as `t31`.
 impl fmt::Display for TrackId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.0.checked_sub(TrackId::FIRST_OWN.0) {
+        match self.0.checked_sub(TrackId::FIRST_SELF_ASSIGNED.0) {
             Some(n) => write!(f, "t{n}"),
             None => write!(f, "#{}", self.0),
         }
@@ -49,7 +49,7 @@ pub fn resolve_target(
 
 /// Object in a hand, as far as its owner knows.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Carried {
+pub struct CarriedObject {
     /// The object; `None` if its owner did not see what it picked up.
     pub object: Option<(TrackId, ClassId)>,
     /// Known contents, in the order in which they were put in.
@@ -58,7 +58,7 @@ pub struct Carried {
     pub n_contents: u32,
 }
 
-impl Carried {
+impl CarriedObject {
     /// Class of the object, if known.
     pub fn class(&self) -> Option<ClassId> {
         self.object.map(|(_, class)| class)
@@ -74,14 +74,14 @@ impl Carried {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Hands {
     /// Objects by hand.
-    pub hands: [Option<Carried>; 2],
+    pub hands: [Option<CarriedObject>; 2],
     /// True if both hands hold the same object.
     pub is_joint: bool,
 }
 
 impl Hands {
     /// Returns the distinct objects held.
-    pub fn held(&self) -> impl Iterator<Item = &Carried> {
+    pub fn held(&self) -> impl Iterator<Item = &CarriedObject> {
         let [left, right] = &self.hands;
         let is_joint = self.is_joint;
         left.iter().chain(right.iter().filter(move |_| !is_joint))
@@ -89,7 +89,7 @@ impl Hands {
 
     /// Returns all objects held, including known contents.
     pub fn all(&self) -> impl Iterator<Item = (TrackId, ClassId)> {
-        self.held().flat_map(Carried::all)
+        self.held().flat_map(CarriedObject::all)
     }
 
     /// Returns whether a hand holds this object itself.

@@ -24,7 +24,8 @@
 //! assert!(briefing.goal.is_none(), "the partner's goal is hidden");
 //!
 //! while env.advance(Some(90))? == AdvanceOutcome::NeedsAction {
-//!     let reward = env.reward(AgentId::HELPER).map(|terms| terms.weigh(&RewardWeights::STANDARD));
+//!     let terms = env.reward(AgentId::HELPER);
+//!     let reward = terms.map(|terms| terms.weighted_sum(&RewardWeights::STANDARD));
 //!     let observation = env.observe(AgentId::HELPER).expect("the helper waits");
 //!     assert_eq!(observation.images.rgb.as_ref().map(Vec::len), Some(3 * 64 * 64));
 //!     // A policy would choose by `observation` and learn from `reward`.

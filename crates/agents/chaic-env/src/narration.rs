@@ -105,7 +105,7 @@ pub fn detected_objects(perceived: &[BelievedObject], camera: &Camera) -> Vec<De
 
 /// Returns the label and the id of an object, for example `apple #31`.
 pub fn object_name(setup: &Setup, entity: EntityId) -> String {
-    let class = setup.thing(entity).map(|thing| thing.class);
+    let class = setup.object(entity).map(|thing| thing.class);
     class.map_or(entity.to_string(), |class| format!("{} {entity}", class.info().label))
 }
 

@@ -81,7 +81,7 @@ pub struct RewardTerms {
 
 impl RewardTerms {
     /// Returns the weighted sum of the terms.
-    pub fn weigh(&self, weights: &RewardWeights) -> f64 {
+    pub fn weighted_sum(&self, weights: &RewardWeights) -> f64 {
         weights.delivered * self.delivered + weights.progress_per_m * self.progress_m
             - if self.is_invalid { weights.invalid } else { 0.0 }
     }
@@ -249,7 +249,7 @@ fn remaining_distance_m(world: &World, agent: AgentId, index: usize) -> Option<f
     }
     let position = state.agents.get(agent.index())?.pose.position;
     let to_goal_m = |from| {
-        let goals = setup.goal_places.iter().filter_map(|goal| setup.thing_index(*goal));
+        let goals = setup.goal_places.iter().filter_map(|goal| setup.object_index(*goal));
         let distances = goals.map(|k| horizontal_distance(from, state.objects[k].position));
         distances.min_by(f32::total_cmp)
     };
@@ -264,7 +264,7 @@ fn remaining_distance_m(world: &World, agent: AgentId, index: usize) -> Option<f
 fn holder(world: &World, index: usize) -> Option<AgentId> {
     let state = world.state();
     let outer = match state.objects[index].location {
-        ObjectLocation::Inside { container, .. } => world.setup().thing_index(container)?,
+        ObjectLocation::Inside { container, .. } => world.setup().object_index(container)?,
         _ => index,
     };
     state.objects[outer].holder()

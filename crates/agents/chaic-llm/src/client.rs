@@ -9,9 +9,9 @@ use chaic_env::RunKey;
 use crate::endpoint::{Client, Failure, ImagesByHash, NoReply};
 use crate::error::LlmError;
 use crate::exchange::{ChatRequest, DecisionRecord, Exchange, Fault, FaultKind, Reply, Usage};
-use crate::rate_limiter::{self, Admission, RateLimiter, Spent};
+use crate::rate_limiter::{self, Admission, RateLimiter, Spending};
 use crate::record::{self, DecisionLog, DecisionLogWriter, RecordEntry, RecordHeader};
-use crate::session::{Session, Source};
+use crate::session::{AnswerSource, Session};
 use crate::settings::{AnswerForm, FailureAction, Settings};
 
 /// Requests of one agent in one episode run, with its record.
@@ -42,7 +42,7 @@ impl Conversation {
     pub fn open(session: &Session, key: &RunKey, agent: AgentId) -> Conversation {
         let mut conversation = Conversation::default();
         let Some(run) = session.run() else { return conversation };
-        if let Source::Replay(from) = &session.source {
+        if let AnswerSource::Replay(from) = &session.source {
             match DecisionLog::read(from, &record::path(from, key, agent)) {
                 Ok(record) => {
                     let exchanges = record.entries.into_iter().filter_map(|entry| match entry {
@@ -65,7 +65,7 @@ impl Conversation {
     fn push(&mut self, session: &Session, entry: RecordEntry) -> Result<(), Halted> {
         let Some(recorder) = &mut self.recorder else { return Ok(()) };
         let pushed = recorder.push(entry);
-        if let Some(copy) = recorder.take_kept() {
+        if let Some(copy) = recorder.take_copy_path() {
             session.warn_of_kept_record(&copy);
         }
         pushed.map_err(|error| halt(session, &error))
@@ -113,12 +113,12 @@ impl<'a> LlmClient<'a> {
                 self.conversation.replay.pop_front();
                 exchange
             }
-            (None, Source::Live(client)) => {
+            (None, AnswerSource::Live(client)) => {
                 self.conversation.check_room(self.session, &request)?;
                 self.send_with_retries(client, frame, request, images)?
             }
-            (None, Source::Replay(_)) => self.next_replayed(frame, &request)?,
-            (None, Source::Offline) => {
+            (None, AnswerSource::Replay(_)) => self.next_replayed(frame, &request)?,
+            (None, AnswerSource::Offline) => {
                 self.session.halt("no endpoint is configured".to_owned());
                 return Err(Halted);
             }
@@ -155,10 +155,10 @@ impl<'a> LlmClient<'a> {
     ) -> Result<Exchange, Halted> {
         let Some(limiter) = self.session.limiter() else { return Err(Halted) };
         let settings = &self.session.settings;
-        let max_cost = Spent::new(1, client.max_usage(&request), &settings.price);
+        let max_cost = Spending::new(1, client.max_usage(&request), &settings.price);
         let mut faults: Vec<Fault> = Vec::new();
         loop {
-            match limiter.enter(max_cost, self.session.stop) {
+            match limiter.wait_for_admission(max_cost, self.session.stop) {
                 Admission::Admitted => {}
                 Admission::Stopped => return Err(Halted),
                 Admission::BudgetSpent(limit) => {
@@ -196,7 +196,7 @@ impl<'a> LlmClient<'a> {
         &self,
         client: &Client,
         limiter: &RateLimiter,
-        max_cost: Spent,
+        max_cost: Spending,
         request: &ChatRequest,
         images: &ImagesByHash,
     ) -> Result<Reply, NoReply> {
@@ -209,7 +209,7 @@ impl<'a> LlmClient<'a> {
             // The cost of a failed or abandoned request is unknown.
             _ => Usage::default(),
         };
-        limiter.settle(max_cost, Spent::new(1, usage, &self.session.settings.price));
+        limiter.settle_cost(max_cost, Spending::new(1, usage, &self.session.settings.price));
         sent
     }
 

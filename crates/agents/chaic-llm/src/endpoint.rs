@@ -12,7 +12,7 @@ use serde_json::{Map, Value, json};
 
 use crate::error::Result;
 use crate::exchange::{ChatRequest, ContentHash, Fault, FaultKind, Reply, Role, Usage};
-use crate::key::Key;
+use crate::key::ApiKey;
 use crate::settings::{EndpointKind, ImageEncoding, PromptSettings, Settings};
 use crate::tokens;
 use wire::{Response, Wire};
@@ -56,7 +56,7 @@ impl From<Failure> for NoReply {
 pub struct Client {
     wire: Arc<Wire>,
     kind: EndpointKind,
-    key: Key,
+    key: ApiKey,
     settings: PromptSettings,
 }
 
@@ -66,12 +66,12 @@ impl Client {
     /// # Errors
     /// If the key is missing.
     pub fn new(settings: &Settings) -> Result<Client> {
-        let key = Key::from_env(&settings.key_env())?;
+        let key = ApiKey::from_env(&settings.key_env())?;
         Ok(Client::with_key(settings, key))
     }
 
     /// Creates a client with a known key.
-    pub fn with_key(settings: &Settings, key: Key) -> Client {
+    pub fn with_key(settings: &Settings, key: ApiKey) -> Client {
         let wire = Arc::new(Wire::new(settings, key.clone()));
         Client { wire, kind: settings.endpoint.kind, key, settings: settings.request.clone() }
     }
@@ -354,7 +354,7 @@ mod tests {
         let (model, messages) = ("m".to_owned(), Vec::new());
         let purpose = crate::exchange::Purpose::Decide;
         let request = ChatRequest { model, purpose, messages, n_schema_plans };
-        (Client::with_key(&settings, Key::new(key)), request)
+        (Client::with_key(&settings, ApiKey::new(key)), request)
     }
 
     #[test]
@@ -421,7 +421,7 @@ mod tests {
         settings.request.max_tokens_field = "max_completion_tokens".to_owned();
         settings.request.extra.insert("think".to_owned(), json!(false));
         settings.request.omit_fields = vec!["top_p".to_owned()];
-        let client = Client::with_key(&settings, Key::new(""));
+        let client = Client::with_key(&settings, ApiKey::new(""));
         let image = ContentHash::new(b"x");
         let message = crate::exchange::Message {
             role: Role::User,

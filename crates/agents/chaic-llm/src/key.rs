@@ -11,27 +11,27 @@ const MIN_MASKED: usize = 8;
 
 /// Key of an endpoint. It cannot be printed or serialized; only the request header contains it.
 #[derive(Clone)]
-pub struct Key(Option<String>);
+pub struct ApiKey(Option<String>);
 
-impl Key {
+impl ApiKey {
     /// Reads the key from an environment variable; no key for an empty name.
     ///
     /// # Errors
     /// [`LlmError::NoKey`] if the variable is unset or empty.
-    pub fn from_env(variable: &str) -> Result<Key> {
+    pub fn from_env(variable: &str) -> Result<ApiKey> {
         if variable.is_empty() {
-            return Ok(Key(None));
+            return Ok(ApiKey(None));
         }
         let value = std::env::var(variable).ok().map(|v| v.trim().to_owned());
         match value.filter(|v| !v.is_empty()) {
-            Some(value) => Ok(Key(Some(value))),
+            Some(value) => Ok(ApiKey(Some(value))),
             None => Err(LlmError::NoKey { variable: variable.to_owned() }),
         }
     }
 
     /// Creates a key from a known value, for tests and other programs.
-    pub fn new(value: &str) -> Key {
-        Key((!value.is_empty()).then(|| value.to_owned()))
+    pub fn new(value: &str) -> ApiKey {
+        ApiKey((!value.is_empty()).then(|| value.to_owned()))
     }
 
     /// Returns the key for the request header.
@@ -48,7 +48,7 @@ impl Key {
     }
 }
 
-impl fmt::Debug for Key {
+impl fmt::Debug for ApiKey {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(if self.0.is_some() { MASK } else { "no key" })
     }
@@ -60,11 +60,11 @@ mod tests {
 
     #[test]
     fn a_key_is_never_printed_and_is_masked_in_answers() {
-        let key = Key::new("sk-very-secret");
+        let key = ApiKey::new("sk-very-secret");
         assert!(!format!("{key:?} {:#?}", Some(&key)).contains("secret"));
         let masked = key.mask("Incorrect API key sk-very-secret!".to_owned());
         assert_eq!(masked, "Incorrect API key [key]!");
-        assert!(Key::from_env("CHAIC_NO_SUCH_VARIABLE").is_err());
-        assert!(Key::from_env("").is_ok_and(|k| k.expose().is_none()));
+        assert!(ApiKey::from_env("CHAIC_NO_SUCH_VARIABLE").is_err());
+        assert!(ApiKey::from_env("").is_ok_and(|k| k.expose().is_none()));
     }
 }

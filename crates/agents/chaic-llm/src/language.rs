@@ -19,8 +19,8 @@ use crate::endpoint::Client;
 use crate::error::{LlmError, Result};
 use crate::policy::LanguagePolicy;
 use crate::prompt_track::PromptTrack;
-use crate::rate_limiter::Spent;
-use crate::session::{Listener, Session, Source, settings_of};
+use crate::rate_limiter::Spending;
+use crate::session::{AnswerSource, Listener, Session, settings_of};
 use crate::settings::{BehaviorSource, Settings};
 
 /// Name of a language helper or partner.
@@ -78,7 +78,7 @@ impl LanguageHelpers {
     pub fn live(settings: Settings, stop: &'static AtomicBool) -> Result<LanguageHelpers> {
         settings.check()?;
         let client = Client::new(&settings)?;
-        LanguageHelpers::with(settings, Source::Live(Box::new(client)), stop)
+        LanguageHelpers::with(settings, AnswerSource::Live(Box::new(client)), stop)
     }
 
     /// Creates helpers that replay the record of a run with its settings.
@@ -88,7 +88,7 @@ impl LanguageHelpers {
     pub fn replay(run: &Path, stop: &'static AtomicBool) -> Result<LanguageHelpers> {
         let settings =
             settings_of(run)?.ok_or_else(|| LlmError::NoRecord { path: run.to_owned() })?;
-        LanguageHelpers::with(settings, Source::Replay(run.to_owned()), stop)
+        LanguageHelpers::with(settings, AnswerSource::Replay(run.to_owned()), stop)
     }
 
     /// Creates helpers that only describe the sensors and grants of a recorded run; `None` if it
@@ -98,7 +98,7 @@ impl LanguageHelpers {
     /// If the record cannot be read.
     pub fn recorded(run: &Path, stop: &'static AtomicBool) -> Result<Option<LanguageHelpers>> {
         let settings = settings_of(run)?;
-        settings.map(|s| LanguageHelpers::with(s, Source::Offline, stop)).transpose()
+        settings.map(|s| LanguageHelpers::with(s, AnswerSource::Offline, stop)).transpose()
     }
 
     /// Creates helpers with a source of answers.
@@ -107,7 +107,7 @@ impl LanguageHelpers {
     /// If a template is invalid.
     pub fn with(
         settings: Settings,
-        source: Source,
+        source: AnswerSource,
         stop: &'static AtomicBool,
     ) -> Result<LanguageHelpers> {
         let session = Arc::new(Session::new(settings, source, stop)?);
@@ -143,7 +143,7 @@ impl LanguageHelpers {
     }
 
     /// Returns the amount spent in this run.
-    pub fn spent(&self) -> Option<Spent> {
+    pub fn spent(&self) -> Option<Spending> {
         self.session.limiter().map(crate::rate_limiter::RateLimiter::spent)
     }
 
@@ -153,7 +153,7 @@ impl LanguageHelpers {
     }
 
     fn is_live(&self) -> bool {
-        matches!(self.session.source, Source::Live(_))
+        matches!(self.session.source, AnswerSource::Live(_))
     }
 
     fn helper(&self, name: &str, key: Option<&RunKey>, rules: PlannerRules) -> Option<Helper> {

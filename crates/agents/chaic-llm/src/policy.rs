@@ -19,11 +19,11 @@ use crate::exchange::{
     Role, Usage,
 };
 use crate::images::RecentImages;
-use crate::prompt_context::{LENGTHS, PromptContext};
+use crate::prompt_context::{LIST_LIMITS, PromptContext};
 use crate::prompt_track::PromptTrack;
 use crate::session::Session;
 use crate::settings::{AnswerForm, Fallback, PromptSettings, PromptSteps};
-use crate::templates::Question;
+use crate::templates::PromptQuestion;
 use crate::tokens;
 
 /// Maximum length of an invalid answer that is repeated to the model, characters.
@@ -259,13 +259,13 @@ impl LanguagePolicy {
     fn prompt(&self, context: &Context<'_>, listed: &[Plan]) -> Result<Prompt, Halted> {
         let settings = self.settings();
         let question = match (settings.steps, self.by_schema) {
-            (PromptSteps::Two, _) => Question::Think,
-            (PromptSteps::One, true) => Question::Schema,
-            (PromptSteps::One, false) => Question::Text,
+            (PromptSteps::Two, _) => PromptQuestion::Think,
+            (PromptSteps::One, true) => PromptQuestion::Schema,
+            (PromptSteps::One, false) => PromptQuestion::Text,
         };
         let images = if self.has_images { self.recent_images.count() } else { 0 };
         let mut shortest = None;
-        for (shortened, length) in LENGTHS.into_iter().enumerate() {
+        for (shortened, length) in LIST_LIMITS.into_iter().enumerate() {
             let (facts, plans) =
                 PromptContext::new(self.track, context, listed, self.last_plan, images, length);
             let text = self.or_halt(self.session.templates.prompt(&facts, question))?;

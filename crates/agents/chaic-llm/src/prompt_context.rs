@@ -17,20 +17,20 @@ const MAX_NAME: usize = 40;
 
 /// Limits of the lists in a prompt. Each further level lists less.
 #[derive(Clone, Copy, Debug)]
-pub struct Length {
+pub struct ListLimits {
     interactions: usize,
     objects: usize,
     plans_per_kind: usize,
 }
 
 /// Levels, from the longest to the shortest prompt (docs/language-helpers.md).
-pub const LENGTHS: [Length; 6] = [
-    Length { interactions: 20, objects: 60, plans_per_kind: 60 },
-    Length { interactions: 10, objects: 40, plans_per_kind: 40 },
-    Length { interactions: 6, objects: 25, plans_per_kind: 25 },
-    Length { interactions: 4, objects: 12, plans_per_kind: 15 },
-    Length { interactions: 2, objects: 6, plans_per_kind: 8 },
-    Length { interactions: 1, objects: 0, plans_per_kind: 4 },
+pub const LIST_LIMITS: [ListLimits; 6] = [
+    ListLimits { interactions: 20, objects: 60, plans_per_kind: 60 },
+    ListLimits { interactions: 10, objects: 40, plans_per_kind: 40 },
+    ListLimits { interactions: 6, objects: 25, plans_per_kind: 25 },
+    ListLimits { interactions: 4, objects: 12, plans_per_kind: 15 },
+    ListLimits { interactions: 2, objects: 6, plans_per_kind: 8 },
+    ListLimits { interactions: 1, objects: 0, plans_per_kind: 4 },
 ];
 
 /// Variables of templates. Lengths in meters and coordinates are texts with one decimal.
@@ -61,11 +61,11 @@ pub struct PromptContext {
     /// Frames to walk ten meters.
     pub frames_per_10_m: u32,
     /// The agent's body.
-    pub me: Body,
+    pub me: BodyFacts,
     /// Granted facts about the task.
     pub disclosed: Option<DisclosedFacts>,
     /// Wanted objects; empty if not granted.
-    pub wanted: Vec<Count>,
+    pub wanted: Vec<ClassCount>,
     /// Facts about the agent itself.
     pub own: SelfFacts,
     /// Other agents.
@@ -73,7 +73,7 @@ pub struct PromptContext {
     /// Task progress.
     pub progress: ProgressFacts,
     /// Semantic map.
-    pub map: Map,
+    pub map: MapFacts,
     /// Valid plans, in the order of their numbers.
     pub plans: Vec<PlanFacts>,
     /// Number of omitted plans.
@@ -82,7 +82,7 @@ pub struct PromptContext {
 
 /// Description of a body.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Body {
+pub struct BodyFacts {
     /// Kind of person.
     pub kind: String,
     /// Lowest and highest reach, if limited.
@@ -116,7 +116,7 @@ pub struct DisclosedFacts {
 
 /// Number of objects of a class.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Count {
+pub struct ClassCount {
     /// Class.
     pub name: String,
     /// Number.
@@ -194,7 +194,7 @@ pub struct ProgressFacts {
     /// Known goal places, nearest first.
     pub goal_places: Vec<GoalPlace>,
     /// Objects known to be there.
-    pub delivered: Vec<Count>,
+    pub delivered: Vec<ClassCount>,
 }
 
 /// Goal place.
@@ -214,7 +214,7 @@ pub struct GoalPlace {
 
 /// Semantic map.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Map {
+pub struct MapFacts {
     /// Relevant objects, nearest first.
     pub objects: Vec<ObjectFacts>,
     /// Number of omitted farther objects.

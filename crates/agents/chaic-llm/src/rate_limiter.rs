@@ -12,7 +12,7 @@ pub(crate) const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Spent amounts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Spent {
+pub struct Spending {
     /// Requests.
     pub requests: u64,
     /// Tokens of prompts and answers.
@@ -21,21 +21,21 @@ pub struct Spent {
     pub cost: f64,
 }
 
-impl Spent {
+impl Spending {
     /// Returns the cost of requests with this usage.
-    pub fn new(requests: u64, usage: Usage, price: &Price) -> Spent {
+    pub fn new(requests: u64, usage: Usage, price: &Price) -> Spending {
         let cost = price.millionths(usage) / 1e6;
-        Spent { requests, tokens: usage.prompt + usage.answer, cost }
+        Spending { requests, tokens: usage.prompt + usage.answer, cost }
     }
 
     /// Adds another amount.
-    pub fn add(&mut self, other: Spent) {
+    pub fn add(&mut self, other: Spending) {
         self.requests += other.requests;
         self.tokens += other.tokens;
         self.cost += other.cost;
     }
 
-    fn subtract(&mut self, other: Spent) {
+    fn subtract(&mut self, other: Spending) {
         self.requests -= other.requests;
         self.tokens -= other.tokens;
         self.cost -= other.cost;
@@ -54,16 +54,16 @@ pub struct RateLimiter {
 
 #[derive(Debug, Default)]
 struct State {
-    spent: Spent,
+    spent: Spending,
     /// Maximum cost of the requests in flight.
-    reserved: Spent,
+    reserved: Spending,
     in_flight: usize,
 }
 
 /// Result of a request for admission.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Admission {
-    /// Admitted; the caller must call [`RateLimiter::settle`].
+    /// Admitted; the caller must call [`RateLimiter::settle_cost`].
     Admitted,
     /// A limit of the budget is spent.
     BudgetSpent(&'static str),
@@ -73,7 +73,7 @@ pub enum Admission {
 
 impl RateLimiter {
     /// Creates a limiter for a run with earlier spending.
-    pub fn new(budget: Budget, in_flight: usize, before: Spent) -> RateLimiter {
+    pub fn new(budget: Budget, in_flight: usize, before: Spending) -> RateLimiter {
         let state = State { spent: before, ..State::default() };
         let (state, changed) = (Mutex::new(state), Condvar::new());
         RateLimiter { budget, in_flight: in_flight.max(1), start: Instant::now(), state, changed }
@@ -82,7 +82,7 @@ impl RateLimiter {
     /// Waits until one more request that costs at most `max_cost` is admitted. If the requests in
     /// flight could exhaust the budget, it waits for them; the budget is exceeded by one request at
     /// most.
-    pub fn enter(&self, max_cost: Spent, stop: &AtomicBool) -> Admission {
+    pub fn wait_for_admission(&self, max_cost: Spending, stop: &AtomicBool) -> Admission {
         let mut state = self.lock();
         loop {
             if stop.load(Ordering::Relaxed) {
@@ -106,7 +106,7 @@ impl RateLimiter {
     }
 
     /// Replaces a reserved cost by the actual cost of a finished request.
-    pub fn settle(&self, max_cost: Spent, cost: Spent) {
+    pub fn settle_cost(&self, max_cost: Spending, cost: Spending) {
         let mut state = self.lock();
         state.in_flight -= 1;
         state.reserved.subtract(max_cost);
@@ -116,11 +116,11 @@ impl RateLimiter {
     }
 
     /// Returns the amount spent so far.
-    pub fn spent(&self) -> Spent {
+    pub fn spent(&self) -> Spending {
         self.lock().spent
     }
 
-    fn spent_limit(&self, spent: Spent) -> Option<&'static str> {
+    fn spent_limit(&self, spent: Spending) -> Option<&'static str> {
         let Budget { max_requests, max_tokens, max_cost, max_minutes, .. } = self.budget;
         let minutes_passed = self.start.elapsed().as_secs_f64() / 60.0;
         [
@@ -133,7 +133,7 @@ impl RateLimiter {
         .find_map(|(is_spent, limit)| is_spent.then_some(limit))
     }
 
-    fn exceeds(&self, total: Spent) -> bool {
+    fn exceeds(&self, total: Spending) -> bool {
         let Budget { max_requests, max_tokens, max_cost, .. } = self.budget;
         max_requests.is_some_and(|n| total.requests > n)
             || max_tokens.is_some_and(|n| total.tokens > n)
@@ -166,8 +166,8 @@ mod tests {
 
     static NOT_STOPPED: AtomicBool = AtomicBool::new(false);
 
-    fn cost(tokens: u64) -> Spent {
-        Spent { requests: 1, tokens, cost: tokens as f64 / 1000.0 }
+    fn cost(tokens: u64) -> Spending {
+        Spending { requests: 1, tokens, cost: tokens as f64 / 1000.0 }
     }
 
     #[test]
@@ -178,14 +178,16 @@ mod tests {
             Budget { max_cost: Some(1.0), ..Budget::default() },
         ];
         for budget in budgets {
-            let limiter = RateLimiter::new(budget, 16, Spent::default());
+            let limiter = RateLimiter::new(budget, 16, Spending::default());
             // Requests that reserve 400 and cost 150 tokens each, eight at a time.
             std::thread::scope(|scope| {
                 for _ in 0..8 {
                     scope.spawn(|| {
-                        while limiter.enter(cost(400), &NOT_STOPPED) == Admission::Admitted {
+                        while limiter.wait_for_admission(cost(400), &NOT_STOPPED)
+                            == Admission::Admitted
+                        {
                             std::thread::yield_now();
-                            limiter.settle(cost(400), cost(150));
+                            limiter.settle_cost(cost(400), cost(150));
                         }
                     });
                 }
@@ -199,13 +201,13 @@ mod tests {
 
     #[test]
     fn requests_in_flight_are_limited() {
-        let limiter = RateLimiter::new(Budget::default(), 3, Spent::default());
+        let limiter = RateLimiter::new(Budget::default(), 3, Spending::default());
         let stop = AtomicBool::new(false);
         for _ in 0..3 {
-            assert_eq!(limiter.enter(cost(1), &stop), Admission::Admitted);
+            assert_eq!(limiter.wait_for_admission(cost(1), &stop), Admission::Admitted);
         }
         std::thread::scope(|scope| {
-            let fourth = scope.spawn(|| limiter.enter(cost(1), &stop));
+            let fourth = scope.spawn(|| limiter.wait_for_admission(cost(1), &stop));
             while !fourth.is_finished() {
                 stop.store(true, Ordering::Relaxed);
             }
@@ -216,13 +218,16 @@ mod tests {
     #[test]
     fn earlier_spending_and_elapsed_time_count() {
         let budget = Budget { max_requests: Some(3), ..Budget::default() };
-        let before = Spent { requests: 3, ..Spent::default() };
+        let before = Spending { requests: 3, ..Spending::default() };
         assert_eq!(
-            RateLimiter::new(budget, 1, before).enter(cost(1), &NOT_STOPPED),
+            RateLimiter::new(budget, 1, before).wait_for_admission(cost(1), &NOT_STOPPED),
             Admission::BudgetSpent("requests")
         );
         let budget = Budget { max_minutes: Some(0.0), ..Budget::default() };
-        let limiter = RateLimiter::new(budget, 1, Spent::default());
-        assert_eq!(limiter.enter(cost(1), &NOT_STOPPED), Admission::BudgetSpent("minutes"));
+        let limiter = RateLimiter::new(budget, 1, Spending::default());
+        assert_eq!(
+            limiter.wait_for_admission(cost(1), &NOT_STOPPED),
+            Admission::BudgetSpent("minutes")
+        );
     }
 }

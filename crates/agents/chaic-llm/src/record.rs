@@ -272,7 +272,7 @@ impl DecisionLogWriter {
     }
 
     /// Returns the path of the copy that the last [`DecisionLogWriter::push`] made.
-    pub fn take_kept(&mut self) -> Option<PathBuf> {
+    pub fn take_copy_path(&mut self) -> Option<PathBuf> {
         self.kept.take()
     }
 
@@ -338,8 +338,9 @@ fn read_before(run: &Path, path: &Path, header: &RecordHeader) -> Result<Option<
 /// # Errors
 /// If the folder cannot be read.
 pub fn all(run: &Path) -> Result<Vec<PathBuf>> {
-    let is_record =
-        |entry: &chaic_files::Entry| entry.kind == EntryKind::File && kept::is_record(&entry.path);
+    let is_record = |entry: &chaic_files::DirectoryEntry| {
+        entry.kind == EntryKind::File && kept::is_record(&entry.path)
+    };
     Ok(walk(&folder(run), 2)?.into_iter().filter(is_record).map(|entry| entry.path).collect())
 }
 

@@ -13,13 +13,13 @@ use serde::{Deserialize, Serialize};
 use crate::endpoint::Client;
 use crate::error::{LlmError, Result};
 use crate::exchange::{ContentHash, Fault};
-use crate::rate_limiter::{RateLimiter, Spent};
+use crate::rate_limiter::{RateLimiter, Spending};
 use crate::record::{self, DecisionLog, RecordEntry};
 use crate::settings::{Budget, Endpoint, Price, PromptSettings, RetrySettings, Settings};
 use crate::templates::Templates;
 
 /// Source of answers.
-pub enum Source {
+pub enum AnswerSource {
     /// An endpoint.
     Live(Box<Client>),
     /// The record of another run, in this folder.
@@ -35,7 +35,7 @@ pub struct Session {
     /// Templates of prompts.
     pub templates: Templates,
     /// Source of answers.
-    pub source: Source,
+    pub source: AnswerSource,
     /// Stop flag of the run; a pause sets it, too.
     pub stop: &'static AtomicBool,
     problem: Mutex<Option<String>>,
@@ -86,7 +86,11 @@ impl Session {
     ///
     /// # Errors
     /// If settings are out of bounds, or a template is invalid.
-    pub fn new(settings: Settings, source: Source, stop: &'static AtomicBool) -> Result<Session> {
+    pub fn new(
+        settings: Settings,
+        source: AnswerSource,
+        stop: &'static AtomicBool,
+    ) -> Result<Session> {
         settings.check_bounds()?;
         let templates = Templates::load(settings.request.templates.as_deref())?;
         let (problem, listener, run) = (Mutex::new(None), OnceLock::new(), OnceLock::new());
@@ -128,7 +132,7 @@ impl Session {
             }
         }
         let is_limited =
-            matches!(self.source, Source::Live(_)) && self.settings.budget.limits_spending();
+            matches!(self.source, AnswerSource::Live(_)) && self.settings.budget.limits_spending();
         let earlier = spent_before(run, &self.settings.price, is_limited)?;
         let limiter = RateLimiter::new(
             self.settings.budget,
@@ -142,7 +146,7 @@ impl Session {
 
     fn recorded(&self) -> Recorded {
         let endpoint =
-            matches!(self.source, Source::Live(_)).then(|| self.settings.endpoint.clone());
+            matches!(self.source, AnswerSource::Live(_)).then(|| self.settings.endpoint.clone());
         Recorded {
             format: FORMAT.to_owned(),
             version: VERSION,
@@ -286,8 +290,8 @@ fn compare(run: &Path, recorded: &Recorded, current: &Recorded) -> Result<()> {
 ///
 /// # Errors
 /// [`LlmError::UnknownSpending`] if one can't be read and `is_limited`.
-fn spent_before(run: &Path, price: &Price, is_limited: bool) -> Result<Spent> {
-    let mut spent = Spent::default();
+fn spent_before(run: &Path, price: &Price, is_limited: bool) -> Result<Spending> {
+    let mut spent = Spending::default();
     for files in record::with_copies(run)? {
         let mut logs: Vec<Vec<RecordEntry>> = Vec::new();
         for path in files {
@@ -307,7 +311,7 @@ fn spent_before(run: &Path, price: &Price, is_limited: bool) -> Result<Spent> {
             let n_shared = logs.iter().map(|log| shared_len(log, &entries)).max().unwrap_or(0);
             for entry in &entries[n_shared..] {
                 if let RecordEntry::Exchange(exchange) = entry {
-                    spent.add(Spent::new(exchange.requests(), exchange.usage(), price));
+                    spent.add(Spending::new(exchange.requests(), exchange.usage(), price));
                 }
             }
             logs.push(entries);
@@ -334,7 +338,7 @@ mod tests {
         let mut settings = Settings::default();
         settings.request.model = "m".to_owned();
         let stop = Box::leak(Box::new(AtomicBool::new(false)));
-        Session::new(settings, Source::Offline, stop).unwrap()
+        Session::new(settings, AnswerSource::Offline, stop).unwrap()
     }
 
     #[test]
@@ -392,7 +396,7 @@ mod tests {
         }
         let price = Price::default();
         let spent = |is_limited| spent_before(run, &price, is_limited);
-        let all = Spent { requests: 5, tokens: 50, cost: 0.0 };
+        let all = Spending { requests: 5, tokens: 50, cost: 0.0 };
         assert_eq!(spent(true).unwrap(), all);
         // It was stopped in its first line.
         std::fs::write(path.with_file_name("torn.jsonl"), "{\"format\"").unwrap();

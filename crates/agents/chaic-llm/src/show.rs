@@ -81,7 +81,7 @@ fn write_exchange(text: &mut String, exchange: &Exchange, detail: Detail) {
         Purpose::Retry => "asked again",
     };
     let _ = writeln!(text, "\n=== frame {}: {purpose}, {}", exchange.frame, exchange.request_hash);
-    for Passage { heading, text: content } in passages(exchange, detail) {
+    for ExchangePart { heading, text: content } in passages(exchange, detail) {
         let _ = writeln!(text, "--- {heading}");
         if !content.is_empty() {
             let _ = writeln!(text, "{content}");
@@ -91,7 +91,7 @@ fn write_exchange(text: &mut String, exchange: &Exchange, detail: Detail) {
 
 /// Part of an exchange with a model.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Passage {
+pub struct ExchangePart {
     /// Kind, for example `to the model, with 3 pictures`.
     pub heading: String,
     /// Text; empty for a failed request.
@@ -106,7 +106,7 @@ pub struct ShownDecision {
     /// Plan, and who chose it.
     pub text: String,
     /// Messages of the exchanges, in order.
-    pub passages: Vec<Passage>,
+    pub passages: Vec<ExchangePart>,
 }
 
 /// Agent of an episode run whose plans a language model chose.
@@ -177,7 +177,7 @@ fn decisions(record: &DecisionLog) -> Vec<ShownDecision> {
 }
 
 /// Returns the messages of an exchange that are not part of an earlier one.
-fn passages(exchange: &Exchange, detail: Detail) -> Vec<Passage> {
+fn passages(exchange: &Exchange, detail: Detail) -> Vec<ExchangePart> {
     let messages = &exchange.request.messages;
     let is_first = matches!(exchange.request.purpose, Purpose::Decide | Purpose::Think);
     let shown = match detail {
@@ -194,17 +194,17 @@ fn passages(exchange: &Exchange, detail: Detail) -> Vec<Passage> {
             0 => String::new(),
             n => format!(", with {n} pictures"),
         };
-        Passage { heading: format!("{author}{pictures}"), text: message.text.clone() }
+        ExchangePart { heading: format!("{author}{pictures}"), text: message.text.clone() }
     };
     let fault =
-        |fault: &Fault| Passage { heading: format!("failed: {fault}"), text: String::new() };
-    let mut passages: Vec<Passage> = shown.iter().map(message).collect();
+        |fault: &Fault| ExchangePart { heading: format!("failed: {fault}"), text: String::new() };
+    let mut passages: Vec<ExchangePart> = shown.iter().map(message).collect();
     passages.extend(exchange.faults.iter().map(fault));
     if let Reply::Answer { text, usage, latency_ms, .. } = &exchange.reply {
         let about = if usage.estimated { "about " } else { "" };
         let (prompt, answer, s) = (usage.prompt, usage.answer, *latency_ms as f64 / 1000.0);
         let heading = format!("answer ({about}{prompt} + {answer} tokens, {s:.1} s)");
-        passages.push(Passage { heading, text: text.clone() });
+        passages.push(ExchangePart { heading, text: text.clone() });
     }
     passages
 }
@@ -298,7 +298,7 @@ mod tests {
 
     #[test]
     fn passages_after_the_limit_are_left_out() {
-        let passage = || Passage { heading: "answer".to_owned(), text: "x".repeat(3 << 20) };
+        let passage = || ExchangePart { heading: "answer".to_owned(), text: "x".repeat(3 << 20) };
         let decision =
             |frame| ShownDecision { frame, text: String::new(), passages: vec![passage()] };
         let shown = ShownAgent::new(AgentId::HELPER, "m", vec![decision(1), decision(2)]);

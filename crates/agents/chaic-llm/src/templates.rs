@@ -46,7 +46,7 @@ pub const BUILT_IN: &[(&str, &str)] = built_in![
 
 /// Request at the end of a prompt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Question {
+pub enum PromptQuestion {
     /// Reasoning and choice as JSON.
     Schema,
     /// Reasoning and choice as text.
@@ -108,16 +108,16 @@ impl Templates {
     ///
     /// # Errors
     /// If a template is invalid.
-    pub fn prompt(&self, facts: &PromptContext, question: Question) -> Result<String> {
+    pub fn prompt(&self, facts: &PromptContext, question: PromptQuestion) -> Result<String> {
         let task = match facts.track {
             PromptTrack::Hidden => "task.txt",
             PromptTrack::KnownTask => "task_known.txt",
             PromptTrack::Partner => "task_partner.txt",
         };
         let ask = match question {
-            Question::Schema => "ask_schema.txt",
-            Question::Text => "ask_text.txt",
-            Question::Think => "ask_think.txt",
+            PromptQuestion::Schema => "ask_schema.txt",
+            PromptQuestion::Text => "ask_text.txt",
+            PromptQuestion::Think => "ask_think.txt",
         };
         let parts = [
             ("Task", task),
@@ -171,7 +171,7 @@ impl Templates {
     /// Renders all templates once, so that errors appear before the first episode.
     fn render_samples(&self) -> Result<()> {
         for facts in PromptContext::samples() {
-            for question in [Question::Schema, Question::Text, Question::Think] {
+            for question in [PromptQuestion::Schema, PromptQuestion::Text, PromptQuestion::Think] {
                 self.prompt(&facts, question)?;
             }
             self.choose(&facts)?;
@@ -224,7 +224,7 @@ mod tests {
     fn built_in_templates_render_with_all_six_parts() {
         let templates = Templates::load(None).unwrap();
         for facts in PromptContext::samples() {
-            let prompt = templates.prompt(&facts, Question::Schema).unwrap();
+            let prompt = templates.prompt(&facts, PromptQuestion::Schema).unwrap();
             let titles: Vec<&str> = prompt.lines().filter(|l| l.starts_with("## ")).collect();
             assert_eq!(titles.len(), 6, "{prompt}");
             assert!(!prompt.contains("\n\n\n"), "{prompt}");
@@ -235,7 +235,8 @@ mod tests {
     #[test]
     fn a_prompt_states_the_numbers_of_omitted_entries() {
         let templates = Templates::load(None).unwrap();
-        let render = |facts: &PromptContext| templates.prompt(facts, Question::Schema).unwrap();
+        let render =
+            |facts: &PromptContext| templates.prompt(facts, PromptQuestion::Schema).unwrap();
         let mut facts = PromptContext::samples().swap_remove(0);
         let prompt = render(&facts);
         for expected in [
@@ -259,7 +260,7 @@ mod tests {
     #[test]
     fn a_partner_is_told_the_limits_of_its_hands() {
         let templates = Templates::load(None).unwrap();
-        let render = |facts: &PromptContext| templates.prompt(facts, Question::Text).unwrap();
+        let render = |facts: &PromptContext| templates.prompt(facts, PromptQuestion::Text).unwrap();
         let mut samples = PromptContext::samples().into_iter();
         let mut facts = samples.find(|f| f.track == PromptTrack::Partner).unwrap();
         let prompt = render(&facts);
@@ -285,7 +286,10 @@ mod tests {
         let templates = Templates::load(Some(dir.path())).unwrap();
         let facts = &PromptContext::samples()[0];
         assert!(
-            templates.prompt(facts, Question::Text).unwrap().ends_with("Say a number, hidden.")
+            templates
+                .prompt(facts, PromptQuestion::Text)
+                .unwrap()
+                .ends_with("Say a number, hidden.")
         );
         assert_ne!(templates.hash(), Templates::load(None).unwrap().hash());
         templates.write(&dir.path().join("copy")).unwrap();

@@ -9,7 +9,7 @@ use chaic_core::{Action, Agent, AgentError, Briefing, Observation};
 use chaic_sandbox::Isolation;
 
 use crate::message::{
-    MAX_PERCEIVED, PROTOCOL, RequestMessage, ResponseMessage, cut, observation_frame, plain,
+    MAX_THOUGHT_ENTRIES, PROTOCOL, RequestMessage, ResponseMessage, cut, observation_frame, plain,
 };
 use crate::pool::Pool;
 use crate::process::HelperProcess;
@@ -119,7 +119,7 @@ impl SubprocessAgent {
 /// Returns the thought with shortened texts and lists.
 fn bounded(thought: Thought) -> Thought {
     let Thought { plan, mode, last_observed, mut perceived, belief } = thought;
-    perceived.truncate(MAX_PERCEIVED);
+    perceived.truncate(MAX_THOUGHT_ENTRIES);
     perceived.iter_mut().for_each(|object| object.name = cut(&object.name));
     Thought {
         plan: cut(&plan),
@@ -131,14 +131,15 @@ fn bounded(thought: Thought) -> Thought {
 }
 
 fn bounded_belief(belief: PartnerBelief) -> PartnerBelief {
-    let texts = |list: &[String]| list.iter().take(MAX_PERCEIVED).map(|text| cut(text)).collect();
+    let texts =
+        |list: &[String]| list.iter().take(MAX_THOUGHT_ENTRIES).map(|text| cut(text)).collect();
     let chances = |list: &[(String, u16)]| {
-        list.iter().take(MAX_PERCEIVED).map(|(name, p)| (cut(name), (*p).min(1000))).collect()
+        list.iter().take(MAX_THOUGHT_ENTRIES).map(|(name, p)| (cut(name), (*p).min(1000))).collect()
     };
     PartnerBelief {
         goals: chances(&belief.goals),
         people: chances(&belief.people),
-        extra: belief.extra.into_iter().take(MAX_PERCEIVED).collect(),
+        extra: belief.extra.into_iter().take(MAX_THOUGHT_ENTRIES).collect(),
         position_cm: belief.position_cm,
         evidence: texts(&belief.evidence),
         plan: texts(&belief.plan),
@@ -224,7 +225,7 @@ mod tests {
 
     #[test]
     fn a_belief_is_kept_with_bounded_lists_texts_and_probabilities() {
-        let many = MAX_PERCEIVED + 1;
+        let many = MAX_THOUGHT_ENTRIES + 1;
         let long = "x".repeat(100_000);
         let belief = PartnerBelief {
             goals: vec![(long.clone(), 60_000); many],
@@ -238,7 +239,10 @@ mod tests {
         let kept = *bounded(thought).belief.expect("it is kept");
         assert_eq!((kept.people.len(), kept.position_cm), (2, Some([120, -35])));
         assert_eq!(kept.people[0], ("child".to_owned(), 700));
-        assert_eq!([kept.goals.len(), kept.evidence.len(), kept.plan.len()], [MAX_PERCEIVED; 3]);
+        assert_eq!(
+            [kept.goals.len(), kept.evidence.len(), kept.plan.len()],
+            [MAX_THOUGHT_ENTRIES; 3]
+        );
         assert!(kept.goals.iter().all(|(name, p)| name.len() < 10_000 && *p == 1000));
         assert!(kept.evidence.iter().chain(&kept.plan).all(|text| text.len() < 10_000));
     }

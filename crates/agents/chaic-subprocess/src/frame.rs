@@ -14,7 +14,7 @@ use std::io::{self, Read, Write};
 use chaic_core::observation::SensorConfig;
 
 /// Longest head, bytes: 50 times the longest observed one.
-pub const MAX_HEAD: usize = 1 << 20;
+pub const MAX_HEAD_BYTES: usize = 1 << 20;
 /// Longest body, bytes: the images of the largest observation.
 pub const MAX_BODY: usize = SensorConfig::MAX_OBSERVATION_BYTES as usize;
 
@@ -31,8 +31,8 @@ impl MessageFrame {
     /// Writes the frame and flushes.
     ///
     /// # Errors
-    /// If head or body exceed [`MAX_HEAD`] or [`MAX_BODY`] (nothing is written then), or if the pipe is
-    /// closed.
+    /// If head or body exceed [`MAX_HEAD_BYTES`] or [`MAX_BODY`] (nothing is written then), or if
+    /// the pipe is closed.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         self.check().map_err(|text| io::Error::new(io::ErrorKind::InvalidInput, text))?;
         out.write_all(&(self.head.len() as u32).to_le_bytes())?;
@@ -48,9 +48,10 @@ impl MessageFrame {
     /// One line with the lengths and their limits.
     pub fn check(&self) -> Result<(), String> {
         let (head, body) = (self.head.len(), self.body.len());
-        if head > MAX_HEAD || body > MAX_BODY {
+        if head > MAX_HEAD_BYTES || body > MAX_BODY {
             return Err(format!(
-                "a message of {head} and {body} bytes; head and body hold at most {MAX_HEAD} and {MAX_BODY}"
+                "a message of {head} and {body} bytes; head and body hold at most \
+                 {MAX_HEAD_BYTES} and {MAX_BODY}"
             ));
         }
         Ok(())
@@ -59,8 +60,8 @@ impl MessageFrame {
     /// Reads the next frame; `None` if the pipe was closed before it.
     ///
     /// # Errors
-    /// If the pipe is closed within a frame, or if a length exceeds [`MAX_HEAD`] or `max_body`, which is
-    /// [`MAX_BODY`] for helpers and 0 for chaic.
+    /// If the pipe is closed within a frame, or if a length exceeds [`MAX_HEAD_BYTES`] or
+    /// `max_body`, which is [`MAX_BODY`] for helpers and 0 for chaic.
     pub fn read(from: &mut dyn Read, max_body: usize) -> io::Result<Option<MessageFrame>> {
         let mut lengths = [0; 8];
         let n = read_up_to(from, &mut lengths)?;
@@ -75,10 +76,10 @@ impl MessageFrame {
                 as usize
         };
         let (head, body) = (length(0), length(4));
-        if head > MAX_HEAD || body > max_body {
+        if head > MAX_HEAD_BYTES || body > max_body {
             let text = format!(
-                "a frame of {head} and {body} bytes, more than {MAX_HEAD} and {max_body}; does the helper \
-                 print to the standard output?"
+                "a frame of {head} and {body} bytes, more than {MAX_HEAD_BYTES} and {max_body}; \
+                 does the helper print to the standard output?"
             );
             return Err(io::Error::new(io::ErrorKind::InvalidData, text));
         }
@@ -125,7 +126,7 @@ mod tests {
     #[test]
     fn a_frame_that_is_too_long_is_refused_and_not_written() {
         for frame in [
-            MessageFrame { head: vec![b' '; MAX_HEAD + 1], body: Vec::new() },
+            MessageFrame { head: vec![b' '; MAX_HEAD_BYTES + 1], body: Vec::new() },
             MessageFrame { head: Vec::new(), body: vec![0; MAX_BODY + 1] },
         ] {
             let mut written = Vec::new();

@@ -6,7 +6,7 @@
 use chaic_core::agent::Thought;
 use chaic_core::geom::Camera;
 use chaic_core::observation::{
-    FrameHistorySpec, Granted, HistoryFrame, Images, Proprioception, SensorConfig,
+    FrameHistorySpec, GrantedInfo, HistoryFrame, Images, Proprioception, SensorConfig,
 };
 use chaic_core::{Action, Briefing, Observation};
 use serde::de::DeserializeOwned;
@@ -16,8 +16,8 @@ use crate::frame::MessageFrame;
 
 /// Longest text of a helper that is kept, bytes: a thought, a problem.
 pub const MAX_TEXT: usize = 2000;
-/// Largest number of believed objects in a thought that is kept.
-pub const MAX_PERCEIVED: usize = 256;
+/// Largest number of entries of a list in a thought that are kept.
+pub const MAX_THOUGHT_ENTRIES: usize = 256;
 
 /// Cuts a text of any length after [`MAX_TEXT`] bytes.
 pub(crate) fn cut(text: &str) -> String {
@@ -142,7 +142,7 @@ pub struct ObservationMessage {
     /// Camera of the images.
     pub camera: Camera,
     /// Granted information.
-    pub granted: Granted,
+    pub granted: GrantedInfo,
     /// Images in the body of the frame.
     pub images: Vec<ImageHeader>,
     /// Frame and camera of each history image, oldest first. The oldest image is named

@@ -303,7 +303,7 @@ impl Batch {
         let envs = self.envs()?;
         let reward = |slot: &SlotId| {
             let terms = envs.envs()[slot.env].reward(slot.agent);
-            terms.unwrap_or_default().weigh(&weights)
+            terms.unwrap_or_default().weighted_sum(&weights)
         };
         let rewards = envs.slots().iter().map(reward).collect();
         Ok(PyArray1::from_vec(py, rewards))

@@ -51,5 +51,5 @@ pub fn weigh_reward(
     weights: BTreeMap<String, f64>,
 ) -> PyResult<f64> {
     let terms = RewardTerms { delivered, progress_m, is_invalid };
-    Ok(terms.weigh(&parse_weights(&weights)?))
+    Ok(terms.weighted_sum(&parse_weights(&weights)?))
 }

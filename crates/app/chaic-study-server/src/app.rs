@@ -34,7 +34,7 @@ pub struct App {
     /// Content security policy of the page.
     pub policy: HeaderValue,
     /// Episodes, if the simulator runs on the server.
-    pub play: Option<Arc<Play>>,
+    pub play: Option<Arc<EpisodeService>>,
     /// Clock.
     pub clock: Clock,
     /// Receiver of problems.
@@ -42,7 +42,7 @@ pub struct App {
 }
 
 /// Episodes that participants play.
-pub struct Play {
+pub struct EpisodeService {
     /// Open episodes.
     pub sessions: Sessions,
     /// Digest of the page. Answers contain it in place of the digest of the study.
@@ -58,15 +58,15 @@ pub fn n_play_threads(has_own_helpers: bool) -> usize {
     if has_own_helpers { n_cores + WAITING_THREADS } else { n_cores }
 }
 
-impl Play {
+impl EpisodeService {
     /// Creates the state without open episodes.
     pub fn new(
         page_digest: String,
         helpers: &'static dyn HelperRegistry,
         n_threads: usize,
-    ) -> Play {
+    ) -> EpisodeService {
         let threads = Arc::new(Semaphore::new(n_threads));
-        Play { sessions: Sessions::new(helpers), page_digest, threads }
+        EpisodeService { sessions: Sessions::new(helpers), page_digest, threads }
     }
 }
 

@@ -32,9 +32,9 @@ pub use app::{Clock, Reporter};
 pub use error::{Result, ServerError};
 pub use limits::{
     ENTRY_RATE, MAX_BODY_BYTES, MAX_SESSIONS, MAX_TURN_BYTES, MAX_TURN_FRAMES, PARTICIPANT_RATE,
-    Rate, SESSION_IDLE_SECS, TURN_RATE,
+    RateLimit, SESSION_IDLE_SECS, TURN_RATE,
 };
 pub use refusal::Refusal;
 pub use server::{ServerOptions, StudyServer};
-pub use sessions::Turn;
-pub use store::Counts;
+pub use sessions::AdvanceRequest;
+pub use store::ParticipantCounts;

@@ -29,9 +29,9 @@ pub const WRITER_THREADS: usize = 16;
 pub const WAITING_THREADS: usize = 32;
 /// Rate of requests of one participant. The page sends one request at a time, with all waiting
 /// records.
-pub const PARTICIPANT_RATE: Rate = Rate { burst: 100, per_sec: 20 };
+pub const PARTICIPANT_RATE: RateLimit = RateLimit { burst: 100, per_sec: 20 };
 /// Rate of new participants: a school class that begins at once, then five a second.
-pub const ENTRY_RATE: Rate = Rate { burst: 200, per_sec: 5 };
+pub const ENTRY_RATE: RateLimit = RateLimit { burst: 200, per_sec: 5 };
 
 /// Maximum size of the body of a turn, bytes: a plan has less than 200 characters.
 pub const MAX_TURN_BYTES: usize = 4 << 10;
@@ -41,7 +41,7 @@ pub const MAX_TURN_FRAMES: u32 = 240;
 /// largest size.
 pub const VIEW_PX: [u32; 2] = [512, 64];
 /// Rate of turns of one participant. The page asks for at most 14 pictures a second.
-pub const TURN_RATE: Rate = Rate { burst: 60, per_sec: 20 };
+pub const TURN_RATE: RateLimit = RateLimit { burst: 60, per_sec: 20 };
 /// Maximum number of episodes in memory: see the measured size of an episode in docs/studies.md.
 pub const MAX_SESSIONS: usize = 200;
 /// Time without a turn after which an episode leaves the memory, seconds.
@@ -53,7 +53,7 @@ pub const RECORD_FRAMES: u32 = 15;
 
 /// Limit of a request rate.
 #[derive(Clone, Copy, Debug)]
-pub struct Rate {
+pub struct RateLimit {
     /// Maximum number at once.
     pub burst: u64,
     /// Number per second in the long run.

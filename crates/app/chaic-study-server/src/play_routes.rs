@@ -22,12 +22,12 @@ use tokio::task::spawn_blocking;
 
 use crate::access::TokenDigest;
 use crate::app::{
-    App, Play, episode_failure, json_response, no_such_page, read_text, refusal_response,
+    App, EpisodeService, episode_failure, json_response, no_such_page, read_text, refusal_response,
     server_failure,
 };
 use crate::limits::MAX_TURN_BYTES;
 use crate::refusal::Refusal;
-use crate::sessions::Turn;
+use crate::sessions::AdvanceRequest;
 
 /// Creates the routes.
 pub fn router() -> Router<Arc<App>> {
@@ -63,7 +63,7 @@ async fn turn(
         return refusal_response(&app, &refusal);
     }
     let turn = match read_text(body, MAX_TURN_BYTES).await {
-        Ok(text) => Turn::parse(&text),
+        Ok(text) => AdvanceRequest::parse(&text),
         Err(response) => return response,
     };
     let turn = match turn {
@@ -100,7 +100,9 @@ async fn simulate<T: Send + 'static>(
     app: Arc<App>,
     code: String,
     headers: &HeaderMap,
-    perform: impl FnOnce(&App, &Play, &str, &TokenDigest) -> Result<T, Refusal> + Send + 'static,
+    perform: impl FnOnce(&App, &EpisodeService, &str, &TokenDigest) -> Result<T, Refusal>
+    + Send
+    + 'static,
 ) -> Result<T, Response> {
     let token = TokenDigest::of_request(headers).filter(|_| is_code(&code));
     let token = token.ok_or_else(|| refusal_response(&app, &Refusal::Token))?;

@@ -26,14 +26,14 @@ use tokio::sync::Semaphore;
 use tokio::time::{sleep, timeout};
 
 use crate::access::{AllowedHosts, is_host_name};
-use crate::app::{App, Clock, Play, Reporter, n_play_threads};
+use crate::app::{App, Clock, EpisodeService, Reporter, n_play_threads};
 use crate::error::{Result, ServerError};
 use crate::limits::{
     HEADER_TIMEOUT, IDLE_INTERVAL, MAX_CONNECTIONS, MAX_HEADER_BYTES, STOP_TIMEOUT, WRITE_TIMEOUT,
     WRITER_THREADS,
 };
 use crate::routes::router;
-use crate::store::{Counts, Store};
+use crate::store::{ParticipantCounts, Store};
 use crate::write_timeout::WriteTimeout;
 
 /// Threads that handle requests.
@@ -103,7 +103,7 @@ impl StudyServer {
             for name in plan.helpers() {
                 find(helpers, name, RuleSet::PAPER.planner)?;
             }
-            let play = Arc::new(Play::new(page_digest, helpers, n_threads));
+            let play = Arc::new(EpisodeService::new(page_digest, helpers, n_threads));
             (study_page_without_simulator(title, &content), Some(play))
         } else {
             (study_page(title, &content), None)
@@ -121,7 +121,7 @@ impl StudyServer {
     }
 
     /// Returns the number of participants with files.
-    pub fn counts(&self) -> Counts {
+    pub fn counts(&self) -> ParticipantCounts {
         self.app.store.counts()
     }
 
@@ -129,7 +129,7 @@ impl StudyServer {
     ///
     /// # Errors
     /// [`ServerError::Listen`].
-    pub fn run(self, stop: &AtomicBool) -> Result<Counts> {
+    pub fn run(self, stop: &AtomicBool) -> Result<ParticipantCounts> {
         let StudyServer { runtime, listener, address, app } = self;
         let listener = {
             let _runtime = runtime.enter();
@@ -153,7 +153,7 @@ fn is_built_in(name: &str) -> bool {
 }
 
 /// Closes episodes without turns, with the processes of their helpers.
-async fn close_idle(app: Arc<App>, play: Arc<Play>) {
+async fn close_idle(app: Arc<App>, play: Arc<EpisodeService>) {
     loop {
         sleep(IDLE_INTERVAL).await;
         play.sessions.close_idle((app.clock)());

@@ -29,7 +29,7 @@ use crate::token_bucket::TokenBucket;
 /// Request of the page for the next picture: `advance` in `web/src/messages.ts`.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Turn {
+pub struct AdvanceRequest {
     /// Number of frames by which the world advances, unless the person must decide before.
     pub frames: Frame,
     /// Side of the picture, pixels.
@@ -39,13 +39,13 @@ pub struct Turn {
     pub input: Option<LiveInput>,
 }
 
-impl Turn {
+impl AdvanceRequest {
     /// Parses and checks a turn.
     ///
     /// # Errors
     /// [`Refusal::Input`].
-    pub fn parse(text: &str) -> Result<Turn, Refusal> {
-        let turn: Turn =
+    pub fn parse(text: &str) -> Result<AdvanceRequest, Refusal> {
+        let turn: AdvanceRequest =
             serde_json::from_str(text).map_err(|error| Refusal::Input(error.to_string()))?;
         let [largest, step] = VIEW_PX;
         let problem = if turn.frames > MAX_TURN_FRAMES {
@@ -157,7 +157,7 @@ impl Sessions {
         code: &str,
         trial: usize,
         number: u64,
-        turn: &Turn,
+        turn: &AdvanceRequest,
     ) -> Result<Bytes, Refusal> {
         let open = self.find(code, trial)?;
         let mut game = try_lock(&open.game)?;
@@ -283,7 +283,7 @@ impl Game {
         code: &str,
         trial: usize,
         number: u64,
-        turn: &Turn,
+        turn: &AdvanceRequest,
     ) -> Result<Bytes, Refusal> {
         if number != self.next {
             return Err(Refusal::Turn { next: self.next });
@@ -307,7 +307,7 @@ impl Game {
         Ok(answer)
     }
 
-    fn advance(&mut self, turn: &Turn) -> Result<(), Refusal> {
+    fn advance(&mut self, turn: &AdvanceRequest) -> Result<(), Refusal> {
         let was_waiting = self.session.status() == LiveStatus::Waiting;
         let has_decided = turn.input.as_ref().is_some_and(|input| self.session.decide(input));
         let status = self.session.advance(turn.frames)?;

@@ -74,7 +74,7 @@ pub struct RunningTrial {
 
 /// Number of participants with files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Counts {
+pub struct ParticipantCounts {
     /// All participants.
     pub participants: usize,
     /// Participants who have finished.
@@ -299,11 +299,11 @@ impl Store {
     }
 
     /// Counts the participants.
-    pub fn counts(&self) -> Counts {
+    pub fn counts(&self) -> ParticipantCounts {
         let participants = lock(&self.participants);
         let all = participants.by_code.values();
         let complete = all.filter(|p| p.is_complete.load(Ordering::Relaxed)).count();
-        Counts { participants: participants.by_code.len(), complete }
+        ParticipantCounts { participants: participants.by_code.len(), complete }
     }
 
     fn path(&self, code: &str) -> PathBuf {

@@ -1,18 +1,18 @@
 //! Rate limit by a token bucket. Time is a parameter.
 
-use crate::limits::Rate;
+use crate::limits::RateLimit;
 
 /// State of a rate limit.
 #[derive(Clone, Debug)]
 pub struct TokenBucket {
-    rate: Rate,
+    rate: RateLimit,
     tokens: u64,
     at_secs: u64,
 }
 
 impl TokenBucket {
     /// Creates a full bucket.
-    pub fn new(rate: Rate, now_secs: u64) -> TokenBucket {
+    pub fn new(rate: RateLimit, now_secs: u64) -> TokenBucket {
         TokenBucket { rate, tokens: rate.burst, at_secs: now_secs }
     }
 
@@ -34,7 +34,7 @@ mod tests {
 
     #[test]
     fn a_bucket_gives_its_burst_and_then_its_rate() {
-        let mut bucket = TokenBucket::new(Rate { burst: 3, per_sec: 2 }, 10);
+        let mut bucket = TokenBucket::new(RateLimit { burst: 3, per_sec: 2 }, 10);
         let mut taken = |now_secs| (0..9).filter(|_| bucket.take(now_secs)).count();
         assert_eq!([taken(10), taken(10), taken(11), taken(99), taken(98)], [3, 0, 2, 3, 0]);
     }

@@ -4,7 +4,7 @@ use chaic_agents::perception_factory::GroundTruthPerceptionFactory;
 use chaic_agents::policies::ExternalPolicy;
 use chaic_agents::{PlanningAgent, partners};
 use chaic_core::agent::Thought;
-use chaic_core::observation::{Grants, Held, SensorConfig};
+use chaic_core::observation::{Grants, HeldObject, SensorConfig};
 use chaic_core::{
     Action, Agent as _, AgentError, AgentId, FRAMES_PER_SECOND, Frame, Hand, Outcome, Target,
 };
@@ -504,7 +504,7 @@ impl LiveSession {
 
     fn hands(&self) -> [Option<String>; 2] {
         let proprioception = self.env.world().proprioception(self.seat, Grants::IDS, None);
-        let text = |held: &Held| {
+        let text = |held: &HeldObject| {
             let identity = held.identity.as_ref();
             let name = identity.map(|held| object_name(&self.setup, held.entity));
             let name = name.unwrap_or_else(|| "something".to_owned());

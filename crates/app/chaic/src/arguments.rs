@@ -32,7 +32,7 @@ pub use self::contest::{
     LeaderboardBuildArguments, LeaderboardCommand, SubmitCheckArguments, SubmitCommand,
     SubmitPackArguments, SubmitRunArguments, SubmitScoreArguments, SubmitVerifyArguments,
 };
-pub use self::episodes::{EpisodesCommand, ImportCommand, ImportHalf, OriginalArguments};
+pub use self::episodes::{EpisodesCommand, ImportCommand, ImportSplit, OriginalArguments};
 pub use self::eval::{
     EndpointArguments, EvalArguments, EvalCommand, LanguageArguments, ModelEvaluation,
 };

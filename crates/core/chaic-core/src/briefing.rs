@@ -33,7 +33,7 @@ pub enum CompanionRole {
 
 /// Motion and reach parameters of the rules that planning requires.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Motion {
+pub struct MotionParams {
     /// Angle of one turn, radians.
     pub turn_rad: f32,
     /// A step ends with the frame in which it has covered more than this distance, meters.
@@ -55,7 +55,7 @@ pub struct Briefing {
     /// Capability of the reader's own body.
     pub capability: Capability,
     /// Motion and reach parameters of the world.
-    pub motion: Motion,
+    pub motion: MotionParams,
     /// The other people.
     pub companions: Vec<Companion>,
     /// Seed of the reader's own random streams; it differs between agents of one episode. The seed

@@ -11,8 +11,8 @@
 //!
 //! **Invariants**
 //! - Every type here is plain data and cannot access a world.
-//! - Hidden information is in a separate type ([`observation::Granted`]). The runner fills it on
-//!   request and writes it into the trace; an agent cannot obtain it otherwise.
+//! - Hidden information is in a separate type ([`observation::GrantedInfo`]). The runner fills it
+//!   on request and writes it into the trace; an agent cannot obtain it otherwise.
 
 pub mod geom;
 pub mod ids;

@@ -268,7 +268,7 @@ impl Grants {
 
 /// A held object, as the hand senses it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Held {
+pub struct HeldObject {
     /// Number of contained objects; 0 for all but containers and vehicles.
     pub n_contents: u32,
     /// True if both hands hold this object: furniture.
@@ -306,7 +306,7 @@ pub struct Proprioception {
     pub pose: Pose,
     /// Objects in the left and the right hand. A rider's left hand holds the bicycle, whose
     /// contents are those of the basket. Furniture appears in both hands.
-    pub hands: [Option<Held>; 2],
+    pub hands: [Option<HeldObject>; 2],
     /// Action that has just ended, with the target as the agent named it, and the outcome.
     /// `None` at the start. Also `None` after an action that another agent's choice replaced by a
     /// joint lift (rules of the original), unless ids are granted.
@@ -318,7 +318,7 @@ pub struct Proprioception {
 
 impl Proprioception {
     /// Returns the distinct held objects.
-    pub fn held(&self) -> impl Iterator<Item = &Held> {
+    pub fn held(&self) -> impl Iterator<Item = &HeldObject> {
         let [left, right] = &self.hands;
         let same = left.as_ref().is_some_and(|l| l.in_both_hands);
         left.iter().chain(right.iter().filter(move |_| !same))
@@ -407,7 +407,7 @@ impl ObjectState {
 
 /// Granted information; every field is empty without its grant.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Granted {
+pub struct GrantedInfo {
     /// `ids`: class of each object and person in the agent's own image, in the order of ids.
     /// Structure is not listed.
     pub classes: Vec<(EntityId, ClassId)>,
@@ -446,10 +446,10 @@ pub struct Observation {
     /// [requested](SensorConfig::frame_history).
     pub frame_history: Vec<HistoryFrame>,
     /// Granted information.
-    pub granted: Granted,
+    pub granted: GrantedInfo,
 }
 
-impl Granted {
+impl GrantedInfo {
     /// Returns the class of an id in the agent's own image; requires the grant of ids.
     pub fn class_of(&self, entity: EntityId) -> Option<ClassId> {
         let at = self.classes.binary_search_by_key(&entity, |(e, _)| *e).ok()?;

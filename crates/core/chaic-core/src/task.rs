@@ -45,7 +45,7 @@ pub enum TaskId {
 
 /// Source of a task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Origin {
+pub enum TaskOrigin {
     /// The paper's table 1, with the original's name of the task.
     Paper(&'static str),
     /// A task of chaic, without published results and without bundled or standard episodes.
@@ -155,7 +155,7 @@ pub struct TaskInfo {
     /// Column title in tables.
     pub title: &'static str,
     /// Source of the task.
-    pub origin: Origin,
+    pub origin: TaskOrigin,
     /// Kind of scene.
     pub scene: SceneKind,
     /// Kind of person of the partner.
@@ -187,7 +187,7 @@ const fn indoor(
     id: TaskId,
     name: &'static str,
     title: &'static str,
-    origin: Origin,
+    origin: TaskOrigin,
     partner: PersonKind,
     arrangement: Arrangement,
 ) -> TaskInfo {
@@ -223,7 +223,7 @@ const fn impaired(
 ) -> TaskInfo {
     let impairments = Impairments::new(impairment);
     let partner = PersonKind { persona: Persona::Adult, impairments };
-    indoor(id, name, title, Origin::Chaic, partner, Arrangement::Default)
+    indoor(id, name, title, TaskOrigin::Chaic, partner, Arrangement::Default)
 }
 
 const BED: &[&str] = &["bed"];
@@ -234,7 +234,7 @@ pub static TASKS: [TaskInfo; 12] = [
         TaskId::NoConstraint,
         "no_constraint",
         "No constraint",
-        Origin::Paper("normal"),
+        TaskOrigin::Paper("normal"),
         unimpaired(Persona::Adult),
         Arrangement::Default,
     ),
@@ -242,7 +242,7 @@ pub static TASKS: [TaskInfo; 12] = [
         TaskId::HighTarget,
         "high_target",
         "High target",
-        Origin::Paper("highthing"),
+        TaskOrigin::Paper("highthing"),
         unimpaired(Persona::Child),
         Arrangement::HighTargets,
     ),
@@ -250,7 +250,7 @@ pub static TASKS: [TaskInfo; 12] = [
         TaskId::HighContainer,
         "high_container",
         "High container",
-        Origin::Paper("highcontainer"),
+        TaskOrigin::Paper("highcontainer"),
         unimpaired(Persona::Child),
         Arrangement::HighContainers,
     ),
@@ -261,7 +261,7 @@ pub static TASKS: [TaskInfo; 12] = [
             TaskId::HighGoal,
             "high_goal",
             "High goal",
-            Origin::Paper("highgoalplace"),
+            TaskOrigin::Paper("highgoalplace"),
             unimpaired(Persona::Child),
             Arrangement::Default,
         )
@@ -270,7 +270,7 @@ pub static TASKS: [TaskInfo; 12] = [
         TaskId::LowTarget,
         "low_target",
         "Low target",
-        Origin::Paper("lowthing"),
+        TaskOrigin::Paper("lowthing"),
         unimpaired(Persona::Wheelchair),
         Arrangement::LowTargets,
     ),
@@ -278,7 +278,7 @@ pub static TASKS: [TaskInfo; 12] = [
         TaskId::Obstacle,
         "obstacle",
         "Obstacle",
-        Origin::Paper("wheelchair"),
+        TaskOrigin::Paper("wheelchair"),
         unimpaired(Persona::Wheelchair),
         Arrangement::Obstacles,
     ),
@@ -286,7 +286,7 @@ pub static TASKS: [TaskInfo; 12] = [
         id: TaskId::Shopping,
         name: "shopping",
         title: "Shopping",
-        origin: Origin::Paper("outdoor_shopping"),
+        origin: TaskOrigin::Paper("outdoor_shopping"),
         scene: SceneKind::Street,
         partner: unimpaired(Persona::Rider),
         has_child: true,
@@ -302,7 +302,7 @@ pub static TASKS: [TaskInfo; 12] = [
         id: TaskId::MovingHouse,
         name: "moving_house",
         title: "Moving house",
-        origin: Origin::Paper("outdoor_furniture"),
+        origin: TaskOrigin::Paper("outdoor_furniture"),
         scene: SceneKind::Yard,
         partner: unimpaired(Persona::Frail),
         has_child: false,
@@ -328,12 +328,12 @@ impl TaskId {
 
     /// Returns the eight tasks of the benchmark, in the order of the paper's result table.
     pub fn paper() -> impl Iterator<Item = TaskId> {
-        TASKS.iter().filter(|t| t.origin != Origin::Chaic).map(|t| t.id)
+        TASKS.iter().filter(|t| t.origin != TaskOrigin::Chaic).map(|t| t.id)
     }
 
     /// Returns the tasks that are not in the paper.
     pub fn chaic() -> impl Iterator<Item = TaskId> {
-        TASKS.iter().filter(|t| t.origin == Origin::Chaic).map(|t| t.id)
+        TASKS.iter().filter(|t| t.origin == TaskOrigin::Chaic).map(|t| t.id)
     }
 
     /// Returns the properties of the task.
@@ -349,8 +349,8 @@ impl TaskId {
     /// Returns the original's name of the task, if it is in the paper.
     pub fn original_name(self) -> Option<&'static str> {
         match self.info().origin {
-            Origin::Paper(name) => Some(name),
-            Origin::Chaic => None,
+            TaskOrigin::Paper(name) => Some(name),
+            TaskOrigin::Chaic => None,
         }
     }
 }

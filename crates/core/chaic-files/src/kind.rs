@@ -101,7 +101,7 @@ pub(crate) fn names_below<'p>(root: &Path, path: &'p Path) -> Result<Vec<&'p std
 
 /// Directory entry found by [`walk`].
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Entry {
+pub struct DirectoryEntry {
     /// Path, which begins with the searched folder.
     pub path: PathBuf,
     /// Kind of the entry.
@@ -116,19 +116,19 @@ pub struct Entry {
 ///
 /// # Errors
 /// If the file system refuses.
-pub fn walk(folder: &Path, depth: u32) -> Result<Vec<Entry>> {
+pub fn walk(folder: &Path, depth: u32) -> Result<Vec<DirectoryEntry>> {
     let mut found = Vec::new();
     enter(folder, kind(folder)?, depth + 1, &mut found)?;
     found.sort();
     Ok(found)
 }
 
-fn enter(path: &Path, kind: EntryKind, depth: u32, found: &mut Vec<Entry>) -> Result<()> {
+fn enter(path: &Path, kind: EntryKind, depth: u32, found: &mut Vec<DirectoryEntry>) -> Result<()> {
     if kind == EntryKind::Missing {
         return Ok(());
     }
     if kind != EntryKind::Folder || depth == 0 {
-        found.push(Entry { path: path.to_owned(), kind });
+        found.push(DirectoryEntry { path: path.to_owned(), kind });
         return Ok(());
     }
     let error = || FileError::context("list", path);
@@ -154,8 +154,9 @@ mod tests {
         }
         let list = |depth| {
             let found = walk(at, depth).unwrap().into_iter();
-            let name =
-                |e: Entry| (e.path.strip_prefix(at).unwrap().to_str().unwrap().to_owned(), e.kind);
+            let name = |e: DirectoryEntry| {
+                (e.path.strip_prefix(at).unwrap().to_str().unwrap().to_owned(), e.kind)
+            };
             found.map(name).collect::<Vec<_>>()
         };
         let file = |name: &str| (name.to_owned(), EntryKind::File);

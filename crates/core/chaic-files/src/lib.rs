@@ -9,7 +9,7 @@ mod kind;
 mod open;
 mod output_file;
 
-pub use kind::{Entry, EntryKind, is_file_below, kind, kind_below, walk};
+pub use kind::{DirectoryEntry, EntryKind, is_file_below, kind, kind_below, walk};
 pub use open::{
     create_executable, create_folders_below, create_or_replace, open_existing_for_append,
     open_file, open_for_append, open_or_create, open_user_file, read_below, read_bounded,

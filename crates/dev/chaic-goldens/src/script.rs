@@ -22,7 +22,7 @@ const TOGETHER_FRAMES: u32 = 500;
 #[derive(Debug)]
 pub struct Script {
     people: Vec<Actor>,
-    counts: Counts,
+    counts: EventCounts,
 }
 
 /// State of one agent.
@@ -35,7 +35,7 @@ struct Actor {
 
 /// Number of events by kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
+pub struct EventCounts {
     /// Objects taken.
     pub taken: u32,
     /// Objects put into a container or basket.
@@ -58,7 +58,10 @@ impl Script {
             let rng = RngStream::new(seed, "goldens", u64::from(a.0));
             Actor { rng, target: None }
         };
-        Script { people: world.setup().agents().map(actor).collect(), counts: Counts::default() }
+        Script {
+            people: world.setup().agents().map(actor).collect(),
+            counts: EventCounts::default(),
+        }
     }
 
     /// Plays to a frame, or to the end of the episode.
@@ -77,13 +80,13 @@ impl Script {
     }
 
     /// Returns the event counts so far.
-    pub fn event_counts(&self) -> Counts {
+    pub fn event_counts(&self) -> EventCounts {
         self.counts
     }
 
     /// Returns the event counts as text.
     pub fn counts_text(&self) -> String {
-        let Counts { taken, stowed, released, removed, lifted, delivered } = self.counts;
+        let EventCounts { taken, stowed, released, removed, lifted, delivered } = self.counts;
         let mut text = String::new();
         for (what, n) in [
             ("taken", taken),
@@ -100,7 +103,7 @@ impl Script {
     }
 }
 
-impl Counts {
+impl EventCounts {
     fn count(&mut self, kind: EventKind) {
         match kind {
             EventKind::Taken { .. } => self.taken += 1,
@@ -138,8 +141,8 @@ fn choose(world: &World, agent: AgentId, actor: &mut Actor) -> ResolvedAction {
 /// Takes or removes a nearby object, or approaches it.
 fn take(world: &World, agent: AgentId, hand: Hand, actor: &mut Actor) -> ResolvedAction {
     let setup = world.setup();
-    let role = |e: EntityId| setup.thing(e).map(|t| t.class.info().role);
-    let is_movable = |e: &EntityId| setup.thing(*e).is_some_and(|t| !t.fixed);
+    let role = |e: EntityId| setup.object(e).map(|t| t.class.info().role);
+    let is_movable = |e: &EntityId| setup.object(*e).is_some_and(|t| !t.fixed);
     let heavy: Vec<EntityId> = setup
         .entities()
         .filter(|e| role(*e) == Some(Role::HeavyTarget))
@@ -164,8 +167,8 @@ impl Actor {
     fn choose_target(&mut self, world: &World, agent: AgentId) -> Option<EntityId> {
         let (setup, now) = (world.setup(), world.state().frame);
         let is_there = |e: &EntityId| {
-            let state = setup.thing_index(*e).map(|i| &world.state().objects[i]);
-            setup.thing(*e).is_some_and(|t| !t.fixed && t.class.info().is_movable())
+            let state = setup.object_index(*e).map(|i| &world.state().objects[i]);
+            setup.object(*e).is_some_and(|t| !t.fixed && t.class.info().is_movable())
                 && state.is_some_and(|t| t.is_resting() && t.delivered.is_none())
         };
         if let Some((object, until)) = self.target
@@ -177,7 +180,7 @@ impl Actor {
         let mut candidates: Vec<EntityId> = setup.entities().filter(is_there).collect();
         candidates
             .sort_by(|a, b| distance(world, agent, *a).total_cmp(&distance(world, agent, *b)));
-        let role = |e: &EntityId| setup.thing(*e).map(|t| t.class.info().role);
+        let role = |e: &EntityId| setup.object(*e).map(|t| t.class.info().role);
         let can_clear = setup.people[agent.index()].capability().removes_obstacles;
         candidates.retain(|e| can_clear || role(e) != Some(Role::Obstacle));
         let obstacle = candidates.iter().find(|e| role(e) == Some(Role::Obstacle)).copied();
@@ -192,7 +195,7 @@ impl Actor {
 /// Puts the held object on a goal place or on nearby furniture, or approaches it.
 fn put(world: &World, agent: AgentId, hand: Hand, rng: &mut RngStream) -> ResolvedAction {
     let setup = world.setup();
-    let is_fixed = |e: &EntityId| setup.thing(*e).is_some_and(|t| t.fixed);
+    let is_fixed = |e: &EntityId| setup.object(*e).is_some_and(|t| t.fixed);
     let mut places: Vec<EntityId> =
         setup.entities().filter(|e| is_fixed(e) && distance(world, agent, *e) < REACH_M).collect();
     places.extend(&setup.goal_places);
@@ -223,13 +226,13 @@ fn approach_or(
 fn position(world: &World, entity: EntityId) -> chaic_core::Vec3 {
     world
         .setup()
-        .thing_index(entity)
+        .object_index(entity)
         .map_or_else(Default::default, |i| world.state().objects[i].position)
 }
 
 /// Returns the distance in plan from a person to the bounding circle of an object, meters.
 fn distance(world: &World, agent: AgentId, entity: EntityId) -> f32 {
     let here = world.state().agents[agent.index()].pose.position;
-    let radius = world.setup().thing(entity).map_or(0.0, |t| t.half_longer_side_m());
+    let radius = world.setup().object(entity).map_or(0.0, |t| t.half_longer_side_m());
     horizontal_distance(here, position(world, entity)) - radius
 }

@@ -117,7 +117,7 @@ fn motion_of_phase(phase: Phase) -> Motion {
     match phase {
         Phase::Walk { .. } => Motion::Walks,
         Phase::Approach { .. } => Motion::Approaches,
-        Phase::AwaitPartner { .. } => Motion::Awaits,
+        Phase::WaitForOtherAgent { .. } => Motion::Awaits,
         Phase::CarryAlong => Motion::Follows,
         _ => Motion::Other,
     }

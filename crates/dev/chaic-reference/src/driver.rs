@@ -27,12 +27,12 @@ pub(crate) struct Driver {
 }
 
 fn position(world: &World, entity: EntityId) -> Vec3 {
-    let k = world.setup().thing_index(entity).expect("the object exists");
+    let k = world.setup().object_index(entity).expect("the object exists");
     world.state().objects[k].position
 }
 
 fn role(setup: &Setup, entity: EntityId) -> Role {
-    setup.thing(entity).expect("the object exists").class.info().role
+    setup.object(entity).expect("the object exists").class.info().role
 }
 
 /// Returns the furniture that another person picks up now, if the hands of this one are free.
@@ -45,7 +45,7 @@ fn picked_furniture(world: &World, agent: AgentId) -> Option<EntityId> {
         _ => None,
     });
     let mut furniture = picked.filter(|e| {
-        world.setup().thing(*e).is_some_and(|t| t.class.info().role == Role::HeavyTarget)
+        world.setup().object(*e).is_some_and(|t| t.class.info().role == Role::HeavyTarget)
     });
     furniture.next().filter(|_| is_free)
 }
@@ -64,7 +64,7 @@ impl Driver {
         let mut has_moved = false;
         for agent in chosen {
             let Some(place) = self.choose_meeting(world, agent) else { continue };
-            let spec = world.setup().thing(place).expect("the object exists");
+            let spec = world.setup().object(place).expect("the object exists");
             let angle = self.rng.range(0.0, std::f32::consts::TAU);
             let is_furniture = spec.class.info().role == Role::HeavyTarget;
             let [low, high] = if is_furniture { BESIDE_FURNITURE_M } else { BESIDE_M };
@@ -117,7 +117,7 @@ impl Driver {
         let holds_container = hands.iter().flatten().any(|e| role(setup, *e) == Role::Container);
         let wanted = if holds_container { Role::Target } else { wanted };
         let is_possible = |e: &EntityId| {
-            let k = setup.thing_index(*e).expect("the object exists");
+            let k = setup.object_index(*e).expect("the object exists");
             let object = &world.state().objects[k];
             role(setup, *e) == wanted
                 && !setup.things[k].fixed
@@ -147,7 +147,7 @@ impl Driver {
         }
         let here = world.state().agents[agent.index()].pose.position;
         let is_near = |e: &EntityId| {
-            let reach = NEAR_M + setup.thing(*e).expect("it exists").half_longer_side_m();
+            let reach = NEAR_M + setup.object(*e).expect("it exists").half_longer_side_m();
             horizontal_distance(position(world, *e), here) < reach
         };
         let near: Vec<EntityId> = setup.entities().filter(is_near).collect();

@@ -352,7 +352,7 @@ impl Turn<'_> {
     /// Lets falling objects come to rest where they rest in the world.
     fn land(&mut self) {
         for entity in self.facts.setup.entities() {
-            let k = self.facts.setup.thing_index(entity).expect("it exists");
+            let k = self.facts.setup.object_index(entity).expect("it exists");
             if self.state.things[k].location == Location::Falls
                 && let Some(on) = self.given.rests_on[k]
             {

@@ -21,12 +21,12 @@ impl Turn<'_> {
             return;
         }
         let setup = self.facts.setup;
-        let k = setup.thing_index(object).expect("the object exists");
+        let k = setup.object_index(object).expect("the object exists");
         let at = self.given.after.objects[k].0;
         let radius_m = self.facts.numbers.delivery_margin_m
             + self.geometry().half_longer_side_m(setup.goal_places[0]);
         let is_near = |place: EntityId| {
-            let k = setup.thing_index(place).expect("the place exists");
+            let k = setup.object_index(place).expect("the place exists");
             Verdict::at_most(distance_m(self.given.after.objects[k].0, at), radius_m)
         };
         let mut is_at_goal = Verdict::No;

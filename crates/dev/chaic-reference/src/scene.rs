@@ -142,7 +142,7 @@ pub(crate) struct Geometry<'a> {
 
 impl Geometry<'_> {
     fn outline(&self, scene: &Scene, entity: EntityId) -> Outline {
-        let k = self.setup.thing_index(entity).expect("the object exists");
+        let k = self.setup.object_index(entity).expect("the object exists");
         let (position, rotation) = scene.objects[k];
         let size = self.setup.things[k].size_m();
         let front = rotation * Vec3::NEG_Z;
@@ -166,14 +166,14 @@ impl Geometry<'_> {
 
     /// Returns half of the longer side of an object in plan, meters.
     pub(crate) fn half_longer_side_m(&self, entity: EntityId) -> f64 {
-        let k = self.setup.thing_index(entity).expect("the object exists");
+        let k = self.setup.object_index(entity).expect("the object exists");
         let size = self.setup.things[k].size_m();
         0.5 * f64::from(size.x.max(size.z))
     }
 
     /// Returns the height of the highest corner of an object's box, meters.
     pub(crate) fn top_m(&self, scene: &Scene, entity: EntityId) -> f64 {
-        let k = self.setup.thing_index(entity).expect("the object exists");
+        let k = self.setup.object_index(entity).expect("the object exists");
         let (position, rotation) = scene.objects[k];
         let size = self.setup.things[k].size_m();
         let corner = |x: f32, y: f32, z: f32| {

@@ -68,7 +68,7 @@ impl Turn<'_> {
     }
 
     fn index(&self, entity: EntityId) -> usize {
-        self.facts.setup.thing_index(entity).expect("the object exists")
+        self.facts.setup.object_index(entity).expect("the object exists")
     }
 
     pub(crate) fn thing(&self, entity: EntityId) -> Thing {
@@ -203,7 +203,7 @@ impl Turn<'_> {
 
     /// Returns whether the object exists and an approach to it can begin.
     pub(crate) fn is_accessible(&self, agent: AgentId, entity: EntityId) -> Verdict {
-        if self.facts.setup.thing_index(entity).is_none()
+        if self.facts.setup.object_index(entity).is_none()
             || self.thing(entity).location == Location::Broken
         {
             return Verdict::No;

@@ -74,6 +74,24 @@ fn a_fault_ends_the_command_or_is_one_line() {
     assert!(temporary.is_empty() && !out.join("shopping-0.json").exists());
 }
 
+/// The plot of the learning curves fails once, at the only validation.
+#[test]
+fn a_plot_that_failed_is_drawn_at_the_end_of_a_training() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
+    let (config, out) = (path("c.toml"), path("t"));
+    let text = "steps = 1\nwarm_up = 1\nbatch_size = 1\nvalidation_max_per_class = 5\n\
+                [collect]\nepisodes = 1\nimage_size = 32\n";
+    std::fs::write(&config, text).expect("the disk has space");
+    let temporary = path("t/curves.svg.tmp");
+    let plan = ["chaic", "--fault", "io-error", "--path", &temporary, "--at", "0", "--"];
+    let train = ["train", "opponent", "--config", &config, "--out", &out];
+    let trained = reliability(&[&plan[..], &train[..]].concat());
+    let messages = String::from_utf8_lossy(&trained.stderr).into_owned();
+    assert!(trained.status.success() && messages.contains("curves.svg"), "{messages}");
+    assert!(folder.path().join("t/curves.svg").exists(), "{messages}");
+}
+
 /// A drawn secret has a temporary file with the id of its process.
 #[test]
 fn a_fault_hits_the_temporary_file_of_its_process() {

@@ -9,7 +9,7 @@ use chaic_core::geom::{Camera, Pose, Rect, yaw_rotation};
 use chaic_core::observation::Images;
 use chaic_core::rng::RngStream;
 use chaic_core::{AgentId, ClassId, EntityId, Frame, Quat, TaskId, Vec2, Vec3};
-use chaic_render::geometry::FINEST;
+use chaic_render::geometry::FINEST_LEVEL;
 use chaic_render::{Appearance, Channels, MAX_SIDE_PX, Scene, View, floor_plan};
 use chaic_world::{
     AgentSpec, AgentState, Arm, Floor, FloorMaterial, ObjectLocation, ObjectSpec, ObjectState,
@@ -420,7 +420,7 @@ pub fn check(case: &Case, [one, three]: &[ThreadPool; 2]) {
 
 /// Checks the exported geometry.
 fn check_geometry(case: &Case, scene: &Scene) {
-    let level = case.state.objects.len() % (FINEST + 1);
+    let level = case.state.objects.len() % (FINEST_LEVEL + 1);
     let geometry = scene.geometry(&case.state, &case.postures, level);
     for mesh in &geometry.meshes {
         let n = mesh.positions.len();

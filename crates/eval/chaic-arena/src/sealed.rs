@@ -472,7 +472,7 @@ mod tests {
             let position = setup.things[k].position;
             [f64::from(position.x), f64::from(position.z)]
         };
-        let index = |id| setup.thing_index(id).expect("goal places are objects");
+        let index = |id| setup.object_index(id).expect("goal places are objects");
         let places: Vec<[f64; 2]> = setup.goal_places.iter().map(|id| point(index(*id))).collect();
         let distance_m = |[ax, az]: [f64; 2], [bx, bz]: [f64; 2]| {
             ((ax - bx) * (ax - bx) + (az - bz) * (az - bz)).sqrt()

@@ -7,7 +7,7 @@ use chaic_core::{EntityId, Vec2, Vec3};
 use chaic_env::EnvError;
 use chaic_episodes::{Episode, house};
 use chaic_files::{create_folders, write_atomically};
-use chaic_render::geometry::FINEST;
+use chaic_render::geometry::FINEST_LEVEL;
 use chaic_render::{Channels, Scene, View, image_out};
 use chaic_world::{ObjectSpec, Posture, RoomKind, Rules, Setup, World};
 use serde_json::json;
@@ -74,7 +74,7 @@ impl BenchScene {
     pub fn count_triangles(&self) -> usize {
         let setup = self.world.setup();
         let postures: Vec<Posture> = setup.agents().map(|a| self.world.posture(a)).collect();
-        Scene::new(setup).geometry(self.world.state(), &postures, FINEST).count_triangles()
+        Scene::new(setup).geometry(self.world.state(), &postures, FINEST_LEVEL).count_triangles()
     }
 
     /// Writes the scene for other renderers: `scene.glb`, `cameras.json`, and `chaic.png` with the
@@ -87,7 +87,7 @@ impl BenchScene {
         let name = |k: usize| format!("view {k:02}");
         let named: Vec<(String, Camera)> =
             self.cameras.iter().enumerate().map(|(k, c)| (name(k), *c)).collect();
-        let options = SceneOptions { detail: FINEST, hide_ceiling: false };
+        let options = SceneOptions { detail: FINEST_LEVEL, hide_ceiling: false };
         let summary = write_world(&self.world, options, &named, &out.join("scene.glb"))?;
         let cameras: Vec<_> = named.iter().map(|(name, c)| describe(name, c)).collect();
         let entities = json!({

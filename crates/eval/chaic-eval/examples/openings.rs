@@ -10,9 +10,11 @@ use std::collections::BTreeMap;
 
 use chaic_core::TaskId;
 use chaic_core::observation::{Grants, SensorConfig};
-use chaic_core::task::{Origin, SceneKind};
+use chaic_core::task::{SceneKind, TaskOrigin};
 use chaic_episodes::{Split, episodes};
-use chaic_eval::audit::opening::{Opening, distinct, predict, predict_by_value, varying_fields};
+use chaic_eval::audit::opening::{
+    InitialInformation, distinct, predict, predict_by_value, varying_fields,
+};
 use rayon::prelude::*;
 
 /// First generated seed; no named split has it.
@@ -20,7 +22,7 @@ const FIRST_SEED: u64 = 600_000;
 /// Side of the images, pixels.
 const IMAGE_SIZE: u32 = 64;
 
-fn openings(split: &Split, grants: Grants) -> Vec<Opening> {
+fn openings(split: &Split, grants: Grants) -> Vec<InitialInformation> {
     let sensors = SensorConfig {
         image_size: IMAGE_SIZE,
         rgb: true,
@@ -32,14 +34,14 @@ fn openings(split: &Split, grants: Grants) -> Vec<Opening> {
         Split::Generated(_) | Split::GeneratedStandard(_) => TaskId::all().collect(),
         _ => TaskId::paper().collect(),
     };
-    let task_openings = |task: &TaskId| -> Vec<Opening> {
+    let task_openings = |task: &TaskId| -> Vec<InitialInformation> {
         let all = episodes(split, *task).filter_map(Result::ok);
-        all.filter_map(|episode| Opening::new(&episode, grants, sensors).ok()).collect()
+        all.filter_map(|episode| InitialInformation::new(&episode, grants, sensors).ok()).collect()
     };
     tasks.par_iter().flat_map(task_openings).collect()
 }
 
-fn print(openings: &[&Opening]) {
+fn print(openings: &[&InitialInformation]) {
     let n = openings.len();
     let briefings = distinct(openings, |o| o.briefing.clone());
     let seeds = distinct(openings, |o| o.briefing.get("seed").cloned());
@@ -51,8 +53,8 @@ fn print(openings: &[&Opening]) {
         "  {n} openings: {seeds} seeds, {briefings} briefings, {with_proprioception} with proprioception, \
          {with_images} with images"
     );
-    type Label = fn(&Opening) -> String;
-    type Fields = fn(&Opening) -> &BTreeMap<String, String>;
+    type Label = fn(&InitialInformation) -> String;
+    type Fields = fn(&InitialInformation) -> &BTreeMap<String, String>;
     let labels: [(&str, Label); 2] =
         [("task", |o| o.task.to_string()), ("partner", |o| o.partner.to_string())];
     for (name, label) in labels {
@@ -68,7 +70,7 @@ fn print(openings: &[&Opening]) {
         [("briefing", |o| &o.briefing), ("proprioception", |o| &o.proprioception)];
     for (part, fields) in parts {
         for (field, values) in varying_fields(openings, fields) {
-            let value = |o: &Opening| fields(o).get(&field).cloned();
+            let value = |o: &InitialInformation| fields(o).get(&field).cloned();
             let accuracies = labels.map(|(name, label)| {
                 let found = predict_by_value(openings, value, label);
                 format!("{name} {:.3} (z = {:.1})", found.accuracy, found.z())
@@ -88,11 +90,12 @@ fn main() {
             println!("{split}, {name}");
             let all = openings(&split, grants);
             for scene in [SceneKind::House, SceneKind::Street, SceneKind::Yard] {
-                let is_paper_task =
-                    |o: &&Opening| o.scene == scene && o.task.info().origin != Origin::Chaic;
+                let is_paper_task = |o: &&InitialInformation| {
+                    o.scene == scene && o.task.info().origin != TaskOrigin::Chaic
+                };
                 println!(" {scene:?}, the paper's tasks");
                 print(&all.iter().filter(is_paper_task).collect::<Vec<_>>());
-                let scene_openings: Vec<&Opening> =
+                let scene_openings: Vec<&InitialInformation> =
                     all.iter().filter(|o| o.scene == scene).collect();
                 if scene_openings.len() > all.iter().filter(is_paper_task).count() {
                     println!(" {scene:?}, all tasks");

@@ -6,7 +6,7 @@
 //! argument says, with the settings of the standard split.
 
 use chaic_core::TaskId;
-use chaic_core::task::{Origin, SceneKind};
+use chaic_core::task::{SceneKind, TaskOrigin};
 use chaic_episodes::{Split, episodes};
 
 /// First generated seed; no named split has it.
@@ -19,7 +19,7 @@ fn main() {
     let split = Split::GeneratedStandard(FIRST_SEED..FIRST_SEED + n);
     let is_indoors = |task: &TaskId| {
         let info = task.info();
-        info.scene == SceneKind::House && info.origin != Origin::Chaic
+        info.scene == SceneKind::House && info.origin != TaskOrigin::Chaic
     };
     for task in TaskId::paper().filter(is_indoors) {
         // Numbers of objects in each band: all, and those of wanted classes.

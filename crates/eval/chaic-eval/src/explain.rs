@@ -55,19 +55,19 @@ pub struct Explanation {
     /// True if the helper records its belief.
     pub records_belief: bool,
     /// Changes in chronological order.
-    pub timeline: Vec<Entry>,
+    pub timeline: Vec<TimelineEntry>,
     /// Result of the episode, and the last belief.
     pub end: EndSummary,
 }
 
 /// A change at one frame.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Entry {
+pub struct TimelineEntry {
     /// Frame.
     pub frame: Frame,
     /// The change.
     #[serde(flatten)]
-    pub change: Change,
+    pub change: TimelineChange,
     /// The change as sentences.
     pub text: String,
 }
@@ -75,7 +75,7 @@ pub struct Entry {
 /// Change of a belief or plan, or an event. Probabilities are per mille.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
-pub enum Change {
+pub enum TimelineChange {
     /// The first belief.
     FirstBelief {
         /// Target sets.
@@ -91,12 +91,12 @@ pub enum Change {
         retracted: Vec<String>,
         /// Most likely target set, if its probability has changed.
         #[serde(skip_serializing_if = "Option::is_none")]
-        goal: Option<Shift>,
+        goal: Option<HypothesisChange>,
     },
     /// The most likely target set is another one, or its probability crosses a threshold.
-    Goal(Shift),
+    Goal(HypothesisChange),
     /// The same for the kind of person.
-    Person(Shift),
+    Person(HypothesisChange),
     /// The mode or the first planned operation is another one.
     Plan {
         /// New mode, if it has changed.
@@ -132,7 +132,7 @@ pub enum Change {
 
 /// Change of the most likely hypothesis, probabilities per mille.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Shift {
+pub struct HypothesisChange {
     /// Most likely hypothesis.
     pub hypothesis: String,
     /// Its probability.
@@ -200,9 +200,9 @@ pub struct DeliveryCounts {
 /// Explains a trace of an episode with this setup.
 pub fn explain(trace: &Trace, setup: &Setup) -> Explanation {
     let changes = timeline::changes(trace, setup);
-    let entry = |(frame, change): (Frame, Change)| {
+    let entry = |(frame, change): (Frame, TimelineChange)| {
         let text = sentences::describe(&change);
-        Entry { frame, change, text }
+        TimelineEntry { frame, change, text }
     };
     Explanation {
         key: trace.header.key(),

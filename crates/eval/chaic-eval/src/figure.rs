@@ -69,7 +69,7 @@ const GROUP_WIDTH: f64 = 0.82;
 
 /// A mean with its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bar {
+pub struct BarValue {
     /// Height of the bar, 0 to 1.
     pub mean: f64,
     /// Ends of the whisker, 0 to 1 with the mean between them; `None` for no whisker.
@@ -84,12 +84,12 @@ pub struct HelperBars {
     /// Name in the legend.
     pub helper: String,
     /// One entry per task; `None` leaves a gap.
-    pub values: Vec<Option<Bar>>,
+    pub values: Vec<Option<BarValue>>,
 }
 
 /// Results by task and helper.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Bars {
+pub struct BarChart {
     /// Titles of the tasks, from left to right.
     pub tasks: Vec<String>,
     /// Helpers, from left to right within each task.
@@ -137,7 +137,7 @@ pub enum FigureError {
         /// Title of the task.
         task: String,
         /// The invalid value.
-        bar: Bar,
+        bar: BarValue,
     },
     /// The plotting library failed.
     #[error("can't draw the figure: {source}")]
@@ -155,7 +155,7 @@ pub enum FigureError {
 ///
 /// # Errors
 /// [`FigureError`] if the values or the extension are invalid, or the file can't be written.
-pub fn transport_rate(bars: &Bars, out: &Path) -> Result<(), FigureError> {
+pub fn transport_rate(bars: &BarChart, out: &Path) -> Result<(), FigureError> {
     bars.check()?;
     let extension = out.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     let drawn = match extension.as_deref() {
@@ -171,12 +171,12 @@ pub fn transport_rate(bars: &Bars, out: &Path) -> Result<(), FigureError> {
 ///
 /// # Errors
 /// [`FigureError`] if the values are invalid.
-pub fn svg_text(bars: &Bars) -> Result<String, FigureError> {
+pub fn svg_text(bars: &BarChart) -> Result<String, FigureError> {
     bars.check()?;
     draw_svg(bars).map_err(|source| FigureError::Draw { source })
 }
 
-impl Bars {
+impl BarChart {
     fn check(&self) -> Result<(), FigureError> {
         let (n_tasks, n_helpers) = (self.tasks.len(), self.helpers.len());
         if !(1..=MAX_TASKS).contains(&n_tasks) || !(1..=MAX_HELPERS).contains(&n_helpers) {
@@ -207,7 +207,7 @@ type DynError = Box<dyn Error + Send + Sync>;
 type DrawError<DB> = DrawingAreaErrorKind<<DB as DrawingBackend>::ErrorType>;
 type Chart<'a, DB> = ChartContext<'a, DB, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
-fn draw_svg(bars: &Bars) -> Result<String, DynError> {
+fn draw_svg(bars: &BarChart) -> Result<String, DynError> {
     let mut text = String::new();
     let root = SVGBackend::with_string(&mut text, SIZE_PX).into_drawing_area();
     Canvas { root, scale: 1 }.draw(bars)?;
@@ -215,7 +215,7 @@ fn draw_svg(bars: &Bars) -> Result<String, DynError> {
 }
 
 /// Returns the bytes of a PNG file.
-fn draw_png(bars: &Bars) -> Result<Vec<u8>, DynError> {
+fn draw_png(bars: &BarChart) -> Result<Vec<u8>, DynError> {
     let scale = PNG_OVERSAMPLING;
     let size = (SIZE_PX.0 * scale, SIZE_PX.1 * scale);
     let mut large = RgbImage::new(size.0, size.1);
@@ -245,7 +245,7 @@ struct Canvas<DB: DrawingBackend> {
 }
 
 impl<DB: DrawingBackend> Canvas<DB> {
-    fn draw(&self, bars: &Bars) -> Result<(), DrawError<DB>> {
+    fn draw(&self, bars: &BarChart) -> Result<(), DrawError<DB>> {
         register_font();
         self.root.fill(&WHITE)?;
         let legend_px = self.draw_legend(bars)?;
@@ -262,7 +262,7 @@ impl<DB: DrawingBackend> Canvas<DB> {
     }
 
     /// Draws the helpers' names in rows at the top; returns the height in pixels.
-    fn draw_legend(&self, bars: &Bars) -> Result<i32, DrawError<DB>> {
+    fn draw_legend(&self, bars: &BarChart) -> Result<i32, DrawError<DB>> {
         const SWATCH_PX: i32 = 18;
         const GAP_PX: i32 = 8;
         const ENTRY_GAP_PX: i32 = 22;
@@ -318,7 +318,7 @@ impl<DB: DrawingBackend> Canvas<DB> {
         Ok(())
     }
 
-    fn draw_groups(&self, bars: &Bars, chart: &Chart<'_, DB>) -> Result<(), DrawError<DB>> {
+    fn draw_groups(&self, bars: &BarChart, chart: &Chart<'_, DB>) -> Result<(), DrawError<DB>> {
         let width = GROUP_WIDTH / bars.helpers.len() as f64;
         for (index, HelperBars { values, .. }) in bars.helpers.iter().enumerate() {
             for (task, bar) in values.iter().enumerate() {
@@ -332,7 +332,7 @@ impl<DB: DrawingBackend> Canvas<DB> {
 
     fn draw_bar(
         &self,
-        bar: Bar,
+        bar: BarValue,
         x: Range<f64>,
         color: RGBColor,
         chart: &Chart<'_, DB>,

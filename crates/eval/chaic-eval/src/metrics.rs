@@ -1,8 +1,8 @@
 //! The paper's metrics, computed from records.
 //!
-//! [`Tally`] accumulates the records of one episode run into a [`RunResult`]. [`Scores::new`]
-//! computes scores from the results of a run by one of two [`Formulas`]. `docs/metrics.md` gives the
-//! formulas and their sources.
+//! [`ResultAccumulator`] accumulates the records of one episode run into a [`RunResult`].
+//! [`Scores::new`] computes scores from the results of a run by one of two [`Formulas`].
+//! `docs/metrics.md` gives the formulas and their sources.
 
 mod accumulators;
 mod cluster;
@@ -23,15 +23,15 @@ pub use differences::{
     Difference, HelperResults, MeanRate, Resolution, differences, mean_rate, paired_difference,
     resolution, run_differences,
 };
-pub use formulas::{FormulaSet, Formulas, Spread};
+pub use formulas::{FormulaSet, Formulas, SpreadStatistic};
 pub use result::{Delivery, RunResult, RunStatus, Summary};
 pub use robustness::{Estimate, HelperRobustness, PartnerGain, PartnerResults, robustness};
-pub use score::{MAX_NAMED, Score};
+pub use score::{MAX_LISTED_RUNS, Score};
 pub use scores::{PlayedEpisodes, Scores};
 pub use significance::{holm, two_sided_p};
 pub use stats::t_975;
 pub use table::{METRICS, Metric, MetricSource};
-pub use tally::{Tally, tally};
+pub use tally::{ResultAccumulator, result_of_trace};
 
 #[cfg(test)]
 pub(crate) mod tests;

@@ -37,7 +37,7 @@ pub struct ReplayOptions {
 }
 
 /// Detector whose masks are drawn over the helper's view.
-pub trait Masks {
+pub trait MaskDetector {
     /// Returns the label and the pixels of each detection in an image. Color has shape [height,
     /// width, 3], depth in meters has shape [height, width].
     fn find(&mut self, rgb: &[u8], depth_m: &[f32], camera: &Camera) -> Vec<(u8, Vec<u32>)>;
@@ -140,7 +140,7 @@ pub fn write(
     trace: &Trace,
     episode: &Episode,
     options: ReplayOptions,
-    masks: Option<&mut (dyn Masks + '_)>,
+    masks: Option<&mut (dyn MaskDetector + '_)>,
     out: &Path,
     progress: &mut dyn FnMut(Frame) -> ControlFlow<()>,
 ) -> Result<Option<u32>> {
@@ -166,7 +166,7 @@ pub fn write(
 fn draw_images(
     replay: &mut Replay<'_>,
     every: u32,
-    mut masks: Option<&mut (dyn Masks + '_)>,
+    mut masks: Option<&mut (dyn MaskDetector + '_)>,
     progress: &mut dyn FnMut(Frame) -> ControlFlow<()>,
     sink: &mut dyn FnMut(&RgbImage) -> Result<()>,
 ) -> Result<ControlFlow<()>> {
@@ -226,7 +226,7 @@ impl<'a> Replay<'a> {
     }
 
     /// Renders the current frame, with these masks over the helper's view.
-    pub fn render(&self, masks: Option<&mut (dyn Masks + '_)>) -> RgbImage {
+    pub fn render(&self, masks: Option<&mut (dyn MaskDetector + '_)>) -> RgbImage {
         let viewers = [AgentId::PARTNER, AgentId::HELPER];
         let present = viewers.iter().filter(|a| a.index() < self.playback.thoughts().len());
         let view = |agent: &AgentId| match &masks {

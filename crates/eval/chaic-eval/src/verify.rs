@@ -25,7 +25,7 @@ use chaic_episodes::Episode;
 use chaic_world::World;
 
 use crate::error::{EvalError, Result};
-use crate::metrics::{RunResult, RunStatus, tally};
+use crate::metrics::{RunResult, RunStatus, result_of_trace};
 use crate::run::{RunFolder, RunGrants, RunOptions, planned, read_journal};
 use crate::trace_file;
 
@@ -272,7 +272,7 @@ impl TraceVerifier<'_> {
         let Some(recorded) = self.finished.get(&trace.header.key()) else {
             return Some("results.jsonl has no finished result of this run".to_owned());
         };
-        let found = tally(trace).map(|found| match self.has_diagnostics {
+        let found = result_of_trace(trace).map(|found| match self.has_diagnostics {
             true => found,
             false => without_diagnostics(found),
         });

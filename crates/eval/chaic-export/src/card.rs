@@ -121,7 +121,7 @@ pub struct Field {
     /// Meaning, with unit and range.
     pub description: String,
     /// Place of the value in a file.
-    pub place: Place,
+    pub place: ValueLocation,
 }
 
 /// Types of values in records.
@@ -139,7 +139,7 @@ pub enum DataType {
 
 /// Place of a value in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum ValueLocation {
     /// Column of a table.
     Column(&'static str),
     /// JSON path within a file that holds one record.

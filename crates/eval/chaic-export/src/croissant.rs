@@ -3,7 +3,7 @@
 
 use serde_json::{Value, json};
 
-use crate::card::{Creator, DataType, DatasetDescription, Field, Place, common};
+use crate::card::{Creator, DataType, DatasetDescription, Field, ValueLocation, common};
 
 /// Reference that a user of the data cites.
 const CITATION: &str = "Du, W., Lyu, Q., Shan, J., Qi, Z., Zhang, H., Chen, S., Peng, A., Shu, T., Lee, K., Dariush, B., \
@@ -93,8 +93,8 @@ fn field_metadata(records: &str, files: &str, field: &Field) -> Value {
         DataType::Boolean => "sc:Boolean",
     };
     let extract = match field.place {
-        Place::Column(column) => json!({"column": column}),
-        Place::JsonPath(path) => json!({"jsonPath": path}),
+        ValueLocation::Column(column) => json!({"column": column}),
+        ValueLocation::JsonPath(path) => json!({"jsonPath": path}),
     };
     let mut value = json!({
         "@type": "cr:Field",

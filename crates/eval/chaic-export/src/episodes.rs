@@ -7,7 +7,8 @@ use chaic_episodes::{Episode, GeneratorSeeds, Split, generate_episode};
 use chaic_files::{create_folders, write_atomically};
 
 use crate::card::{
-    Creator, DataType, DatasetDescription, Field, FileGroup, LICENSE, Place, RecordSet, common,
+    Creator, DataType, DatasetDescription, Field, FileGroup, LICENSE, RecordSet, ValueLocation,
+    common,
 };
 use crate::error::ExportError;
 use crate::folder::{NewFolder, write_description};
@@ -194,7 +195,7 @@ fn fields() -> Vec<Field> {
         data_type,
         is_list: false,
         description: description.to_owned(),
-        place: Place::JsonPath(path),
+        place: ValueLocation::JsonPath(path),
     };
     vec![
         field("id", DataType::Text, "$.id", "Name of the episode: task, split and number"),

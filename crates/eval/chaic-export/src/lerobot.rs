@@ -461,7 +461,7 @@ fn render_view(scene: &Scene, world: &World, agent: AgentId, size: u32) -> RgbIm
 /// Returns the index of an object's class in the catalogue; -1 for none.
 fn class_index(world: &World, entity: Option<EntityId>) -> f32 {
     let setup = world.setup();
-    let index = entity.and_then(|entity| setup.thing_index(entity));
+    let index = entity.and_then(|entity| setup.object_index(entity));
     index.map_or(-1.0, |k| setup.things[k].class.index() as f32)
 }
 

@@ -81,7 +81,7 @@ impl TaskRate {
 
 /// Difference between a helper's rates and the published ones, over all tasks.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Distance {
+pub struct PublishedDifference {
     /// Number of tasks.
     pub tasks: usize,
     /// Mean of measured minus published.
@@ -100,7 +100,7 @@ pub struct Distance {
 
 /// Returns the difference over these tasks; `None` if nothing is published or a standard error is
 /// unknown.
-pub fn distance(rates: &[TaskRate]) -> Option<Distance> {
+pub fn published_difference(rates: &[TaskRate]) -> Option<PublishedDifference> {
     let known: Option<Vec<(f64, f64)>> =
         rates.iter().map(|r| r.difference().zip(r.chance_se())).collect();
     let known = known.filter(|k| !k.is_empty())?;
@@ -108,7 +108,7 @@ pub fn distance(rates: &[TaskRate]) -> Option<Distance> {
     let two_over_pi = std::f64::consts::FRAC_2_PI;
     let mean = |value: fn(&(f64, f64)) -> f64| known.iter().map(value).sum::<f64>() / n;
     let variance = known.iter().map(|(_, se)| se * se * (1.0 - two_over_pi)).sum::<f64>();
-    Some(Distance {
+    Some(PublishedDifference {
         tasks: known.len(),
         bias: mean(|(d, _)| *d),
         mad: mean(|(d, _)| d.abs()),
@@ -120,7 +120,7 @@ pub fn distance(rates: &[TaskRate]) -> Option<Distance> {
 
 /// Two helpers whose measured order differs from the published one.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Inversion {
+pub struct RankInversion {
     /// Helper with the higher published rate.
     pub higher: String,
     /// Helper with the lower published rate.
@@ -131,16 +131,20 @@ pub struct Inversion {
 
 /// Pairwise order of helpers in a task. Pairs with equal published rates are not counted.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Order {
+pub struct PairwiseOrder {
     /// Number of pairs with different published rates.
     pub pairs: usize,
     /// Pairs in another order than published. A pair with equal measured rates is included.
-    pub inverted: Vec<Inversion>,
+    pub inverted: Vec<RankInversion>,
 }
 
 /// Compares the order of helpers in a task; helpers without results or without a published rate are
 /// left out.
-pub fn order(played: PlayedEpisodes<'_>, task: TaskId, helpers: &[String]) -> Order {
+pub fn pairwise_order(
+    played: PlayedEpisodes<'_>,
+    task: TaskId,
+    helpers: &[String],
+) -> PairwiseOrder {
     let rate = |h: &String| {
         let rate = task_rate(played, task, h)?;
         Some((h.clone(), rate.tr, rate.published?))
@@ -148,7 +152,7 @@ pub fn order(played: PlayedEpisodes<'_>, task: TaskId, helpers: &[String]) -> Or
     let mut rates: Vec<(String, f64, f64)> = helpers.iter().filter_map(rate).collect();
     // Highest published rate first; equal rates in the order of the helpers.
     rates.sort_by(|a, b| b.2.total_cmp(&a.2));
-    let mut order = Order { pairs: 0, inverted: Vec::new() };
+    let mut order = PairwiseOrder { pairs: 0, inverted: Vec::new() };
     for (k, (lower, low_tr, low_published)) in rates.iter().enumerate() {
         for (higher, high_tr, high_published) in &rates[..k] {
             if high_published <= low_published {
@@ -162,13 +166,13 @@ pub fn order(played: PlayedEpisodes<'_>, task: TaskId, helpers: &[String]) -> Or
             let interval =
                 differences(played, &pair).pop().and_then(|d| d.tasks.get(&task).copied());
             let (higher, lower) = (higher.clone(), lower.clone());
-            order.inverted.push(Inversion { higher, lower, interval });
+            order.inverted.push(RankInversion { higher, lower, interval });
         }
     }
     order
 }
 
-impl Inversion {
+impl RankInversion {
     /// Returns whether chance may have caused the inversion: the interval contains zero, or there
     /// is none.
     pub fn is_within_interval(&self) -> bool {
@@ -176,7 +180,7 @@ impl Inversion {
     }
 }
 
-impl Order {
+impl PairwiseOrder {
     /// Returns whether all pairs are in the published order.
     pub fn is_preserved(&self) -> bool {
         self.inverted.is_empty()
@@ -184,6 +188,6 @@ impl Order {
 
     /// Returns whether chance may have caused all inversions.
     pub fn is_within_intervals(&self) -> bool {
-        self.inverted.iter().all(Inversion::is_within_interval)
+        self.inverted.iter().all(RankInversion::is_within_interval)
     }
 }

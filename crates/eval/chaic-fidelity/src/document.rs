@@ -12,7 +12,7 @@ use crate::experiment::Experiment;
 use crate::experiment_folder::PartState;
 use crate::sections::{RuleSection, formulas};
 use crate::switches;
-use chaic_eval::figure::{Bar, Bars, FigureError, HelperBars, transport_rate};
+use chaic_eval::figure::{BarChart, BarValue, FigureError, HelperBars, transport_rate};
 use chaic_eval::metrics::{PlayedEpisodes, RunStatus, Scores};
 use chaic_eval::published::published;
 use chaic_eval::report::{coverage, drawn_interval};
@@ -220,19 +220,19 @@ impl<'a> ReportInputs<'a> {
         text
     }
 
-    fn bars(self, part: &PartState) -> Bars {
+    fn bars(self, part: &PartState) -> BarChart {
         let scores = Scores::new(part.played(), &formulas(part.part.rules));
         let tasks = &self.plan.tasks;
         let bars = |helper: &String| {
             let bar = |task: &TaskId| {
                 let score = scores.get(*task, helper)?;
                 let dot = published(helper).and_then(|row| Some(row.scores(*task)?.tr));
-                Some(Bar { mean: score.tr, interval: drawn_interval(score), dot })
+                Some(BarValue { mean: score.tr, interval: drawn_interval(score), dot })
             };
             let helper_title = part.labels().title(helper);
             HelperBars { helper: helper_title, values: tasks.iter().map(bar).collect() }
         };
-        Bars {
+        BarChart {
             tasks: tasks.iter().map(|t| t.info().title.to_owned()).collect(),
             helpers: self.plan.helpers.iter().map(bars).collect(),
             dots: Some("published".to_owned()),

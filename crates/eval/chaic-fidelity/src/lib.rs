@@ -13,14 +13,15 @@ mod sections;
 mod switches;
 
 pub use compare::{
-    Distance, Inversion, Order, PUBLISHED_EPISODES, TaskRate, distance, order, task_rate,
+    PUBLISHED_EPISODES, PairwiseOrder, PublishedDifference, RankInversion, TaskRate,
+    pairwise_order, published_difference, task_rate,
 };
 pub use document::{
     CAUSES_BEGIN, CAUSES_END, ReportInputs, check_document, document, write_document,
 };
 pub use experiment::{Experiment, ExperimentPart, ExperimentRequest};
 pub use experiment_folder::{ExperimentFolder, PartState, parts};
-pub use switches::{Change, change};
+pub use switches::{SwitchEffect, switch_effect};
 
 #[cfg(test)]
 mod tests;

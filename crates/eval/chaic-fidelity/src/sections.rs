@@ -8,9 +8,10 @@ use chaic_env::helper_registry::NONE;
 use chaic_env::rules::RuleSetName;
 
 use crate::compare::{
-    Distance, Inversion, Order, PUBLISHED_EPISODES, TaskRate, distance, order, task_rate,
+    PUBLISHED_EPISODES, PairwiseOrder, PublishedDifference, RankInversion, TaskRate,
+    pairwise_order, published_difference, task_rate,
 };
-use chaic_eval::metrics::{Formulas, Metric, PlayedEpisodes, Scores, Spread, differences};
+use chaic_eval::metrics::{Formulas, Metric, PlayedEpisodes, Scores, SpreadStatistic, differences};
 use chaic_eval::published::published;
 use chaic_eval::report::{Labels, TextTable, capitalized, interval, number, rounded, title};
 
@@ -28,7 +29,9 @@ pub(super) struct RuleSection<'a> {
 pub(super) fn formulas(rules: RuleSetName) -> Formulas {
     match rules {
         RuleSetName::Paper => Formulas::PAPER,
-        RuleSetName::Compat => Formulas { spread: Spread::StandardError, ..Formulas::ORIGINAL },
+        RuleSetName::Compat => {
+            Formulas { spread: SpreadStatistic::StandardError, ..Formulas::ORIGINAL }
+        }
     }
 }
 
@@ -110,7 +113,7 @@ impl RuleSection<'_> {
     }
 
     fn distances(&self) -> String {
-        let cells = |d: Option<Distance>| match d {
+        let cells = |d: Option<PublishedDifference>| match d {
             None => vec!["/".to_owned(); 5],
             Some(d) => vec![
                 rounded(d.mad),
@@ -122,7 +125,7 @@ impl RuleSection<'_> {
         };
         let known = self.helpers.iter().filter(|h| published(h).is_some());
         let row = |h: &String| {
-            let d = distance(&self.task_rates(h));
+            let d = published_difference(&self.task_rates(h));
             std::iter::once(title(h)).chain(cells(d)).collect::<Vec<String>>()
         };
         let header =
@@ -145,9 +148,12 @@ impl RuleSection<'_> {
     }
 
     fn orders(&self) -> String {
-        let orders: Vec<(TaskId, Order)> =
-            self.tasks.iter().map(|t| (*t, order(self.played, *t, self.helpers))).collect();
-        let row = |(task, o): &(TaskId, Order)| {
+        let orders: Vec<(TaskId, PairwiseOrder)> = self
+            .tasks
+            .iter()
+            .map(|t| (*t, pairwise_order(self.played, *t, self.helpers)))
+            .collect();
+        let row = |(task, o): &(TaskId, PairwiseOrder)| {
             let inverted: Vec<String> = o.inverted.iter().map(inversion).collect();
             vec![
                 task.info().title.to_owned(),
@@ -276,8 +282,8 @@ fn signed(value: f64) -> String {
     if text.ends_with("0.00") { "0.00".to_owned() } else { text }
 }
 
-fn inversion(inversion: &Inversion) -> String {
-    let Inversion { higher, lower, interval: i } = inversion;
+fn inversion(inversion: &RankInversion) -> String {
+    let RankInversion { higher, lower, interval: i } = inversion;
     let pair = format!("{} - {}", title(higher), title(lower));
     match i {
         None => format!("{pair} (of one episode, without interval)"),

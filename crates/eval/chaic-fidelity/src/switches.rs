@@ -17,7 +17,7 @@ const MAX_NAMED: usize = 3;
 
 /// Change of a helper's transport rate by a switch, on the same episodes and seeds.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Change {
+pub struct SwitchEffect {
     /// Name of the rule.
     pub rule: String,
     /// Name of the helper.
@@ -30,12 +30,12 @@ pub struct Change {
 
 /// Returns the change of a helper's rates from `base` to `switched`, over the episode runs that
 /// both completed.
-pub fn change(
+pub fn switch_effect(
     rule: &str,
     base: PlayedEpisodes<'_>,
     switched: &[RunResult],
     helper: &str,
-) -> Change {
+) -> SwitchEffect {
     const NAMES: [&str; 2] = ["base", "switched"];
     let keys = |results: &[RunResult]| -> BTreeSet<RunKey> {
         let scored = results.iter().filter(|r| r.key.helper == helper && r.summary().is_some());
@@ -54,7 +54,7 @@ pub fn change(
     let named = PlayedEpisodes { results: &named, planned: &[], ..base };
     let found = differences(named, &NAMES.map(str::to_owned)).pop();
     let (tasks, all) = found.map_or((BTreeMap::new(), None), |d| (d.tasks, d.all));
-    Change { rule: rule.to_owned(), helper: helper.to_owned(), tasks, all }
+    SwitchEffect { rule: rule.to_owned(), helper: helper.to_owned(), tasks, all }
 }
 
 fn excludes_zero(i: &Interval) -> bool {
@@ -76,13 +76,13 @@ pub(super) fn section(
          environments. Sorted by the magnitude of the change over all tasks. **Bold**: the interval \
          excludes zero. `0`: no episode's rate changed.\n\n"
     );
-    let mut changes: BTreeMap<&str, Vec<Change>> = BTreeMap::new();
+    let mut changes: BTreeMap<&str, Vec<SwitchEffect>> = BTreeMap::new();
     for helper in helpers {
         let compare = |s: &&PartState| {
             let rule = s.part.switch.as_deref().unwrap_or("");
-            change(rule, base.played(), &s.results, helper)
+            switch_effect(rule, base.played(), &s.results, helper)
         };
-        let mut list: Vec<Change> = switches.iter().map(compare).collect();
+        let mut list: Vec<SwitchEffect> = switches.iter().map(compare).collect();
         list.sort_by(|a, b| magnitude(b.all.as_ref()).total_cmp(&magnitude(a.all.as_ref())));
         text += &table(helper, &list, tasks)?.to_markdown();
         text.push('\n');
@@ -98,7 +98,7 @@ fn magnitude(interval: Option<&Interval>) -> f64 {
     interval.map_or(0.0, |i| i.mean.abs())
 }
 
-fn table(helper: &str, changes: &[Change], tasks: &[TaskId]) -> Result<TextTable> {
+fn table(helper: &str, changes: &[SwitchEffect], tasks: &[TaskId]) -> Result<TextTable> {
     let header = ["Rule".to_owned(), "compat to paper".to_owned(), "all".to_owned()].into_iter();
     let mut rows = Vec::new();
     for c in changes {
@@ -124,7 +124,7 @@ fn cell(change: Option<&Interval>) -> String {
 }
 
 /// Reports how many marked cells chance alone would give.
-fn chance(changes: &BTreeMap<&str, Vec<Change>>) -> String {
+fn chance(changes: &BTreeMap<&str, Vec<SwitchEffect>>) -> String {
     let is_nonzero = |i: &&Interval| i.low < i.high;
     let cells = || changes.values().flatten().flat_map(|c| c.tasks.values()).filter(is_nonzero);
     let (n, marked) = (cells().count(), cells().filter(|i| excludes_zero(i)).count());
@@ -137,7 +137,7 @@ fn chance(changes: &BTreeMap<&str, Vec<Change>>) -> String {
 
 fn largest_changes(
     helpers: &[String],
-    changes: &BTreeMap<&str, Vec<Change>>,
+    changes: &BTreeMap<&str, Vec<SwitchEffect>>,
     tasks: &[TaskId],
 ) -> TextTable {
     let row = |task: &TaskId| {

@@ -78,7 +78,7 @@ fn rates_and_chance_equal_the_handmade_example() {
     let obstacle = runs(TaskId::Obstacle, "none", [1.0; 4]);
     let obstacle = rate(&obstacle, TaskId::Obstacle, "none").unwrap();
     assert!(obstacle.is_beyond_chance());
-    let d = distance(&[none, obstacle]).unwrap();
+    let d = published_difference(&[none, obstacle]).unwrap();
     assert_close(d.mad, 0.07);
     assert_close(d.bias, -0.04);
     // Half of 0.108012 * 0.797885, and half of 0.108012 * (1 - 0.636620)^0.5.
@@ -87,12 +87,16 @@ fn rates_and_chance_equal_the_handmade_example() {
     assert_eq!((d.tasks, d.significant), (2, 1));
     assert!(rate(&low(), LOW, "random").is_none());
     let unpublished = runs(LOW, "follow", [1.0; 4]);
-    assert_eq!(distance(&[rate(&unpublished, LOW, "follow").unwrap()]), None);
+    assert_eq!(published_difference(&[rate(&unpublished, LOW, "follow").unwrap()]), None);
 }
 
-fn order_of(results: &[RunResult], helpers: &[String]) -> Order {
+fn order_of(results: &[RunResult], helpers: &[String]) -> PairwiseOrder {
     let environments = Environments::default();
-    order(PlayedEpisodes { results, planned: &[], environments: &environments }, LOW, helpers)
+    pairwise_order(
+        PlayedEpisodes { results, planned: &[], environments: &environments },
+        LOW,
+        helpers,
+    )
 }
 
 #[test]
@@ -124,12 +128,12 @@ fn a_switch_is_compared_on_common_episode_runs() {
     let switched = [run(LOW, "none", 0, 0, 6.0), run(LOW, "none", 1, 0, 4.0)];
     let (low, environments) = (low(), Environments::default());
     let base = PlayedEpisodes { results: &low, planned: &[], environments: &environments };
-    let change = change("world.blocking", base, &switched, "none");
+    let change = switch_effect("world.blocking", base, &switched, "none");
     assert_close(change.tasks[&LOW].mean, 0.2);
     assert_close(change.all.unwrap().low, 0.2);
-    let untouched = super::change("world.blocking", base, &low, "oracle");
+    let untouched = super::switch_effect("world.blocking", base, &low, "oracle");
     assert_eq!((untouched.tasks[&LOW].low, untouched.tasks[&LOW].high), (0.0, 0.0));
-    assert!(super::change("world.blocking", base, &switched, "rhp").all.is_none());
+    assert!(super::switch_effect("world.blocking", base, &switched, "rhp").all.is_none());
 }
 
 fn plan() -> Experiment {

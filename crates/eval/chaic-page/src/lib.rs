@@ -21,9 +21,9 @@ use minijinja::{Environment, context};
 use miniz_oxide::deflate::compress_to_vec;
 use serde_json::json;
 
-pub use overview::{Dot, OverviewRow};
+pub use overview::{EpisodePoint, OverviewRow};
 pub use replays::{PageReplay, ReadLanguage, no_language, read_replays};
-pub use summary::{ActivityRow, ExampleRow, Gain, RunSummary, ScoreRow, Span};
+pub use summary::{ActivityRow, ExampleRow, HelperGain, RunSummary, ScoreRow, StripPosition};
 
 /// Name of the page that a run writes into its folder.
 pub const REPORT_FILE: &str = "report.html";

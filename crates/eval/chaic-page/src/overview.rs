@@ -13,7 +13,7 @@ pub struct OverviewRow {
     /// Title of the task.
     pub task: &'static str,
     /// Dots of the episodes.
-    pub dots: Vec<Dot>,
+    pub dots: Vec<EpisodePoint>,
     /// Number of episodes in which the helper's run has the higher transport rate, the same, and the
     /// lower one.
     pub counts: [usize; 3],
@@ -21,7 +21,7 @@ pub struct OverviewRow {
 
 /// Dot of an episode. Positions are percent of the width and height of the strip.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Dot {
+pub struct EpisodePoint {
     /// Difference of the transport rates: 0 for -1, 50 for 0, 100 for 1.
     pub x: f64,
     /// Height; dots of one place are stacked.
@@ -62,14 +62,14 @@ fn row(task: TaskId, runs: &[&PairedRun], examples: &[&RunKey]) -> OverviewRow {
         let y = BOTTOM - step * *below as f64;
         *below += 1;
         let [rate, alone] = [run.rate, run.baseline_rate].map(|rate| (100.0 * rate).round());
-        Dot {
+        EpisodePoint {
             x: (500.0 * (1.0 + difference(run))).round() / 10.0,
             y: (10.0 * y).round() / 10.0,
             text: format!("{}, seed {}: {rate} %, alone {alone} %", run.key.episode, run.key.seed),
             is_example: examples.contains(&&run.key),
         }
     };
-    let mut dots: Vec<Dot> = runs.iter().map(dot).collect();
+    let mut dots: Vec<EpisodePoint> = runs.iter().map(dot).collect();
     // Dots of examples are drawn last, so that their rings lie on top.
     dots.sort_by_key(|dot| dot.is_example);
     let count = |is: fn(f64) -> bool| runs.iter().filter(|run| is(difference(run))).count();

@@ -28,7 +28,7 @@ pub struct RunSummary {
     /// Result of the helper with the largest gain in one sentence.
     pub lead: String,
     /// Gains of all helpers over no helper.
-    pub gains: Vec<Gain>,
+    pub gains: Vec<HelperGain>,
     /// Scores per task and helper.
     pub scores: Vec<ScoreRow>,
     /// True if the paper reports a score of one of the rows.
@@ -55,7 +55,7 @@ pub struct RunSummary {
 
 /// Gain of a helper.
 #[derive(Clone, Debug, Serialize)]
-pub struct Gain {
+pub struct HelperGain {
     /// Title of the helper.
     pub helper: String,
     /// Its grants.
@@ -78,7 +78,7 @@ pub struct ScoreRow {
     /// Its 95 % interval; empty if unknown.
     pub interval: String,
     /// Positions in the strip.
-    pub span: Span,
+    pub span: StripPosition,
     /// Transport rate in the paper; empty if it has none.
     pub paper: String,
     /// Efficiency improvement, goal inference accuracy, completion ratio and emergency rate.
@@ -89,7 +89,7 @@ pub struct ScoreRow {
 
 /// Positions in the strip of a row, percent of its width.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Span {
+pub struct StripPosition {
     /// Transport rate.
     pub rate: f64,
     /// Ends of the interval.
@@ -298,7 +298,7 @@ fn gains(
     labels: Labels<'_>,
     differences: &[Difference],
     helpers: &[String],
-) -> Vec<Gain> {
+) -> Vec<HelperGain> {
     let grants = labels.helper_grants(helpers).unwrap_or_default();
     let row = |helper: &String| {
         let gain = gain_of(differences, helper).and_then(|difference| difference.all.as_ref());
@@ -306,7 +306,7 @@ fn gains(
             let granted: Vec<String> = file.grants.iter().map(|g| g.replace('_', " ")).collect();
             if granted.is_empty() { "none".to_owned() } else { granted.join(", ") }
         });
-        Gain {
+        HelperGain {
             helper: name(labels, helper),
             grants: if helper == NONE { "–".to_owned() } else { grants },
             rate: number(mean_rate(scores, helper)),
@@ -330,7 +330,7 @@ fn score_rows(scores: &Scores, labels: Labels<'_>) -> Vec<ScoreRow> {
             interval: interval.map_or(String::new(), |[low, high]| {
                 format!("{} to {}", rounded(low), rounded(high))
             }),
-            span: Span {
+            span: StripPosition {
                 rate: position(score.tr),
                 interval: interval.map(|ends| ends.map(position)),
                 paper: paper.map(position),

@@ -23,7 +23,7 @@ fn summary(text: &str) -> RunSummary {
             helper: text.to_owned(),
             rate: "0.50".to_owned(),
             interval: String::new(),
-            span: Span { rate: 50.0, interval: Some([25.0, 75.0]), paper: Some(64.0) },
+            span: StripPosition { rate: 50.0, interval: Some([25.0, 75.0]), paper: Some(64.0) },
             paper: "0.64".to_owned(),
             others: [const { String::new() }; 4],
             episodes: 2,
@@ -34,7 +34,7 @@ fn summary(text: &str) -> RunSummary {
         overview_helper: text.to_owned(),
         overview: vec![OverviewRow {
             task: "Low target",
-            dots: vec![Dot { x: 25.0, y: 90.0, text: text.to_owned(), is_example: true }],
+            dots: vec![EpisodePoint { x: 25.0, y: 90.0, text: text.to_owned(), is_example: true }],
             counts: [0, 0, 1],
         }],
         activities: Vec::new(),

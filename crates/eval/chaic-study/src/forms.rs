@@ -18,7 +18,7 @@ const AGREEMENT: [&str; 2] = ["strongly disagree", "strongly agree"];
 /// A questionnaire. Each item is rated on the scale `first`, `first + step`, ..., `last`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Form {
+pub struct Questionnaire {
     /// Heading.
     pub title: String,
     /// Sentence before the items. `{other}` stands for the other agent of the team.
@@ -34,13 +34,13 @@ pub struct Form {
     /// Formula of the score.
     pub scoring: Scoring,
     /// Items in the order of the page.
-    pub items: Vec<Item>,
+    pub items: Vec<QuestionnaireItem>,
 }
 
 /// An item of a questionnaire.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Item {
+pub struct QuestionnaireItem {
     /// Name in the data.
     pub id: String,
     /// Text. `{other}` stands for the other agent of the team.
@@ -74,9 +74,9 @@ pub enum Scoring {
     Sus,
 }
 
-impl Form {
+impl Questionnaire {
     /// Returns the standard form with a name.
-    pub fn standard(name: &str) -> Option<Form> {
+    pub fn standard(name: &str) -> Option<Questionnaire> {
         let (_, text) = STANDARD.iter().find(|(known, _)| *known == name)?;
         Some(toml::from_str(text).expect("a test parses all standard forms"))
     }
@@ -112,7 +112,10 @@ mod tests {
     use super::*;
 
     /// Rates all items of a form by a function of item number and reversal.
-    fn ratings(form: &Form, rate: impl Fn(usize, bool) -> i32) -> BTreeMap<String, Option<i32>> {
+    fn ratings(
+        form: &Questionnaire,
+        rate: impl Fn(usize, bool) -> i32,
+    ) -> BTreeMap<String, Option<i32>> {
         let items = form.items.iter().enumerate();
         items.map(|(k, item)| (item.id.clone(), Some(rate(k, item.is_reversed)))).collect()
     }
@@ -122,20 +125,20 @@ mod tests {
         for (name, n_items, n_ratings) in
             [("nasa_tlx", 6, 21), ("sus", 10, 5), ("trust", 3, 7), ("fluency", 3, 7)]
         {
-            let form = Form::standard(name).expect("a standard form");
+            let form = Questionnaire::standard(name).expect("a standard form");
             let ids: std::collections::BTreeSet<&String> =
                 form.items.iter().map(|item| &item.id).collect();
             assert_eq!((form.items.len(), ids.len()), (n_items, n_items), "{name}");
             let found = (-10..200).filter(|rating| form.has_rating(*rating)).count();
             assert_eq!(found, n_ratings, "{name}");
         }
-        assert_eq!(Form::standard("tlx"), None);
+        assert_eq!(Questionnaire::standard("tlx"), None);
     }
 
     /// Brooke's formula: odd items count rating - 1, even items 5 - rating; the sum times 2.5.
     #[test]
     fn scores_follow_the_published_formulas() {
-        let sus = Form::standard("sus").expect("a standard form");
+        let sus = Questionnaire::standard("sus").expect("a standard form");
         let brooke = |ratings: [i32; 10]| {
             let points = ratings.iter().enumerate();
             let points = points.map(|(k, r)| if k % 2 == 0 { r - 1 } else { 5 - r });
@@ -144,7 +147,7 @@ mod tests {
         for given in [[3; 10], [5, 1, 4, 2, 5, 1, 5, 1, 4, 3], [1, 5, 2, 4, 1, 5, 1, 5, 1, 5]] {
             assert_eq!(sus.score(&ratings(&sus, |k, _| given[k])), Some(brooke(given)));
         }
-        let tlx = Form::standard("nasa_tlx").expect("a standard form");
+        let tlx = Questionnaire::standard("nasa_tlx").expect("a standard form");
         assert_eq!(tlx.score(&ratings(&tlx, |k, _| 10 * k as i32)), Some(25.0));
         let mut partial = ratings(&tlx, |_, _| 5);
         partial.insert("effort".to_owned(), None);

@@ -31,7 +31,7 @@ pub use data::ParticipantData;
 pub use error::{Result, StudyError};
 pub use plan::{Condition, SEED, StudyPlan, Trial};
 pub use record_check::RecordCheck;
-pub use simulation::{Balance, simulate};
+pub use simulation::{DesignBalance, simulate};
 pub use slots::{SlotHolder, lowest_free_slot};
 pub use study::{
     Design, Factors, FormPlan, Input, MAX_PARTICIPANTS, PERSON, PlaySettings, Seat, Simulator,

@@ -10,7 +10,7 @@ use sha2::{Digest as _, Sha256};
 
 use crate::assignment::Assignment;
 use crate::error::Result;
-use crate::forms::Form;
+use crate::forms::Questionnaire;
 use crate::study::{Design, Input, PERSON, Seat, Study};
 
 /// Maximum number of conditions of a Latin square, which every participant plays.
@@ -212,10 +212,12 @@ impl StudyPlan {
     }
 
     /// Returns the forms that the study uses, with their names.
-    pub fn forms(&self) -> Vec<(&str, Form)> {
+    pub fn forms(&self) -> Vec<(&str, Questionnaire)> {
         let names = self.study.form_names().into_iter();
         names
-            .map(|name| (name, Form::standard(name).expect("checked when the study was read")))
+            .map(|name| {
+                (name, Questionnaire::standard(name).expect("checked when the study was read"))
+            })
             .collect()
     }
 
@@ -232,7 +234,7 @@ impl StudyPlan {
         let frames: f64 = trials.iter().map(horizon).sum();
         let n_positions = trials.last().map_or(0, |trial| trial.position);
         let n_items = |names: &[String]| -> f64 {
-            let forms = names.iter().filter_map(|name| Form::standard(name));
+            let forms = names.iter().filter_map(|name| Questionnaire::standard(name));
             forms.map(|form| form.items.len() as f64).sum()
         };
         let items =

@@ -16,7 +16,7 @@ const SECS_PER_MINUTE: f64 = 60.0;
 
 /// Balance of a design after simulated participants.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Balance {
+pub struct DesignBalance {
     /// Number of participants who arrived.
     pub arrived: u32,
     /// Number of finished slots.
@@ -29,7 +29,7 @@ pub struct Balance {
     pub open_blocks: u32,
 }
 
-impl Balance {
+impl DesignBalance {
     /// Returns the smallest and the largest count of all positions and conditions.
     pub fn range(&self) -> [u32; 2] {
         let all = || self.counts.iter().flatten().copied();
@@ -53,7 +53,7 @@ struct Participant {
 
 /// Simulates participants who arrive one after the other, each with this probability of dropping out
 /// without notice. The slots of drop-outs are free after the study's time-out.
-pub fn simulate(plan: &StudyPlan, n_participants: u32, dropout: f64) -> Balance {
+pub fn simulate(plan: &StudyPlan, n_participants: u32, dropout: f64) -> DesignBalance {
     let timeout_secs = u64::from(plan.study().timeout_minutes) * 60;
     let length_secs = (plan.length_minutes() * SECS_PER_MINUTE) as f32;
     let (mut now_secs, mut late) = (0, 0);
@@ -92,7 +92,7 @@ fn leave(participants: &mut [Participant], now_secs: u64) -> u32 {
     late
 }
 
-fn balance(plan: &StudyPlan, arrived: u32, done: &BTreeSet<u32>, late: u32) -> Balance {
+fn balance(plan: &StudyPlan, arrived: u32, done: &BTreeSet<u32>, late: u32) -> DesignBalance {
     let assignment = plan.assignment();
     let n_positions = assignment.orders()[0].len();
     let mut counts = vec![vec![0; plan.conditions().len()]; n_positions];
@@ -105,5 +105,5 @@ fn balance(plan: &StudyPlan, arrived: u32, done: &BTreeSet<u32>, late: u32) -> B
     }
     let n_orders = assignment.orders().len();
     let open_blocks = blocks.values().filter(|n| **n < n_orders).count() as u32;
-    Balance { arrived, completed: done.len() as u32, late, counts, open_blocks }
+    DesignBalance { arrived, completed: done.len() as u32, late, counts, open_blocks }
 }

@@ -10,7 +10,7 @@ use chaic_files::{read_user_file, toml_message};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Result, StudyError};
-use crate::forms::Form;
+use crate::forms::Questionnaire;
 
 /// Name of a person in traces.
 pub const PERSON: &str = "human";
@@ -385,7 +385,7 @@ impl Study {
 
     fn form_problem(&self) -> Option<String> {
         let FormPlan { after_condition, at_end } = &self.forms;
-        let known = Form::standard_names();
+        let known = Questionnaire::standard_names();
         let mut all = after_condition.iter().chain(at_end);
         if let Some(unknown) = all.find(|name| !known.contains(&name.as_str())) {
             return Some(format!("no form `{unknown}`; expected one of {}", known.join(", ")));

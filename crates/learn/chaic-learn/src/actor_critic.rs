@@ -1,7 +1,7 @@
 //! Interface of actor-critic networks, and their data-parallel optimizer step.
 
 use chaic_core::geom::math;
-use chaic_nn::{AdamWConfig, Network, Pass};
+use chaic_nn::{AdamWConfig, Network, TrainingPass};
 use chaic_training::Learner;
 
 /// Network that computes one logit per action, and state outputs such as the value estimate.
@@ -17,7 +17,7 @@ pub trait ActorCritic: Sync {
         &self,
         parameters: &[f32],
         observations: impl Iterator<Item = &'a Self::Observation> + Clone,
-        pass: &mut Pass,
+        pass: &mut TrainingPass,
     ) -> Vec<ActorCriticOutput>
     where
         Self::Observation: 'a;
@@ -28,7 +28,7 @@ pub trait ActorCritic: Sync {
         &self,
         parameters: &[f32],
         grad_outputs: &[OutputGrad],
-        pass: &mut Pass,
+        pass: &mut TrainingPass,
         grad_parameters: &mut [f32],
     );
 }
@@ -130,7 +130,7 @@ pub fn optimizer_step<M: ActorCritic, S: Sync, T: Default + Send>(
     // The learner averages over shards.
     let weight = n_shards as f32 / batch.len() as f32;
     let shard_gradient =
-        |k: usize, parameters: &[f32], pass: &mut Pass, grad_parameters: &mut [f32]| {
+        |k: usize, parameters: &[f32], pass: &mut TrainingPass, grad_parameters: &mut [f32]| {
             let start = (k * shard_size).min(batch.len());
             let samples = &batch[start..(start + shard_size).min(batch.len())];
             let mut stats = T::default();

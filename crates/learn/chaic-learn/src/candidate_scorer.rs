@@ -8,7 +8,7 @@
 use std::ops::Range;
 
 use chaic_nn::simd::widest;
-use chaic_nn::{Kernel, Network, Node, Pass, Shape, Tensor};
+use chaic_nn::{Kernel, Network, NodeId, Shape, Tensor, TrainingPass};
 
 use crate::actor_critic::{ActorCritic, ActorCriticOutput, OutputGrad, log_softmax};
 
@@ -32,8 +32,8 @@ pub struct CandidateScorer {
     /// Two hidden layers with attention in between, each for logits and state outputs, with no
     /// shared parameters.
     pub network: Network,
-    logit_head: Node,
-    value_head: Node,
+    logit_head: NodeId,
+    value_head: NodeId,
     n_outputs: usize,
     n_state: usize,
     n_candidate: usize,
@@ -121,7 +121,7 @@ impl CandidateScorer {
         let mut network = Network::default();
         let input = network.input(n_state + n_candidate);
         let mut branch = |name: &str, n_outputs: usize| {
-            let dense = |network: &mut Network, layer: &str, from: Node| {
+            let dense = |network: &mut Network, layer: &str, from: NodeId| {
                 network.conv(&format!("{name}.{layer}"), from, Kernel::POINTWISE, width)
             };
             let first = dense(&mut network, "0", input);
@@ -169,8 +169,8 @@ impl CandidateScorer {
     }
 
     /// Creates the buffers of a pass.
-    pub fn pass(&self) -> Pass {
-        Pass::new(&self.network, widest())
+    pub fn pass(&self) -> TrainingPass {
+        TrainingPass::new(&self.network, widest())
     }
 
     /// Returns the number of input rows of a decision.
@@ -222,7 +222,7 @@ impl ActorCritic for CandidateScorer {
         &self,
         parameters: &[f32],
         decisions: impl Iterator<Item = &'a CandidateSet> + Clone,
-        pass: &mut Pass,
+        pass: &mut TrainingPass,
     ) -> Vec<ActorCriticOutput> {
         pass.set_groups(decisions.clone().map(|d| self.n_rows(d)));
         pass.forward(&self.network, parameters, &self.rows(parameters, decisions.clone()));
@@ -243,7 +243,7 @@ impl ActorCritic for CandidateScorer {
         &self,
         parameters: &[f32],
         grad_outputs: &[OutputGrad],
-        pass: &mut Pass,
+        pass: &mut TrainingPass,
         grad_parameters: &mut [f32],
     ) {
         pass.zero_gradients();

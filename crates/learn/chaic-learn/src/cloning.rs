@@ -42,7 +42,7 @@ pub static EXPERTS: [ExpertInfo; 8] = [
     ExpertInfo {
         name: "infer_no_watching",
         knows_goal: false,
-        policy: || infer(InferOptions::NO_WATCHING),
+        policy: || infer(InferOptions::WITHOUT_FOLLOWING),
     },
     ExpertInfo {
         name: "infer_no_planner",

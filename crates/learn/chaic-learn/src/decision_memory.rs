@@ -9,14 +9,14 @@ use crate::scales::{TIME_SCALE_FRAMES, normalize_clamped};
 
 /// Number of additional features per row with memory: whether the row is an earlier decision, and its
 /// age. Both are 0 for the candidates of this decision.
-pub const N_MEMORY_PLAN: usize = 2;
+pub const N_MEMORY_PLAN_FEATURES: usize = 2;
 
 /// The last decisions between several candidates.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct DecisionMemory {
     capacity: usize,
     decisions: VecDeque<EarlierDecision>,
-    /// Encoded decision whose choice is not known yet. Its rows lack the [`N_MEMORY_PLAN`]
+    /// Encoded decision whose choice is not known yet. Its rows lack the [`N_MEMORY_PLAN_FEATURES`]
     /// features.
     pending: Option<CandidateSet>,
 }
@@ -25,7 +25,7 @@ pub(crate) struct DecisionMemory {
 #[derive(Clone, Debug, PartialEq)]
 struct EarlierDecision {
     frame: Frame,
-    /// State features and features of the chosen candidate, without [`N_MEMORY_PLAN`].
+    /// State features and features of the chosen candidate, without [`N_MEMORY_PLAN_FEATURES`].
     features: Vec<f32>,
 }
 
@@ -49,7 +49,7 @@ impl DecisionMemory {
         let pending = self.pending.insert(encoded.clone());
         let rows = pending.candidates.chunks_exact(pending.candidates.len() / pending.n_candidates);
         encoded.candidates =
-            rows.flat_map(|row| row.iter().copied().chain([0.0; N_MEMORY_PLAN])).collect();
+            rows.flat_map(|row| row.iter().copied().chain([0.0; N_MEMORY_PLAN_FEATURES])).collect();
         encoded.memory = self.decisions.iter().flat_map(|decision| decision.row(frame)).collect();
     }
 
@@ -71,7 +71,8 @@ impl EarlierDecision {
     /// Returns the input row at a later frame.
     fn row(&self, frame: Frame) -> impl Iterator<Item = f32> + '_ {
         let age = frame.saturating_sub(self.frame) as f32;
-        let age_features: [f32; N_MEMORY_PLAN] = [1.0, normalize_clamped(age, TIME_SCALE_FRAMES)];
+        let age_features: [f32; N_MEMORY_PLAN_FEATURES] =
+            [1.0, normalize_clamped(age, TIME_SCALE_FRAMES)];
         self.features.iter().copied().chain(age_features)
     }
 }

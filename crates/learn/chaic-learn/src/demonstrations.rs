@@ -170,17 +170,17 @@ fn from_sections(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::features::{N_PLAN, N_STATE};
+    use crate::features::{N_PLAN_FEATURES, N_STATE_FEATURES};
     use chaic_core::rng::RngStream;
 
     fn episode(seed: u64, n: usize) -> Vec<Demonstration> {
         let mut rng = RngStream::new(seed, "demonstrations", 0);
         let mut demonstration = |k: usize| Demonstration {
             observation: CandidateSet {
-                state: (0..N_STATE).map(|_| rng.unit()).collect(),
-                candidates: (0..N_PLAN * (k + 2)).map(|_| rng.unit()).collect(),
+                state: (0..N_STATE_FEATURES).map(|_| rng.unit()).collect(),
+                candidates: (0..N_PLAN_FEATURES * (k + 2)).map(|_| rng.unit()).collect(),
                 n_candidates: k + 2,
-                memory: (0..k * (N_STATE + N_PLAN)).map(|_| rng.unit()).collect(),
+                memory: (0..k * (N_STATE_FEATURES + N_PLAN_FEATURES)).map(|_| rng.unit()).collect(),
             },
             action: k,
             value_target: rng.unit(),
@@ -200,7 +200,13 @@ mod tests {
         }
         assert_eq!(expected.episodes.len(), 5);
         let read = |iterations, identity: &Identity| {
-            Demonstrations::read(folder.path(), iterations, 5, identity, (N_STATE, N_PLAN))
+            Demonstrations::read(
+                folder.path(),
+                iterations,
+                5,
+                identity,
+                (N_STATE_FEATURES, N_PLAN_FEATURES),
+            )
         };
         assert_eq!(read(3, &identity).unwrap(), expected);
         assert_eq!(read(1, &identity).unwrap().episodes.len(), 2);

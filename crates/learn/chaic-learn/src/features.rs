@@ -20,7 +20,7 @@ use crate::candidate_scorer::CandidateSet;
 use crate::decision_memory::DecisionMemory;
 use crate::opponent::network::{N_GOALS, OpponentModel, OpponentPrediction};
 use crate::opponent::tracker::OpponentTracker;
-use crate::opponent::{N_LIMITS, OpponentGoal};
+use crate::opponent::{N_BODY_LIMITS, OpponentGoal};
 use crate::plan_history::PlanHistory;
 use crate::scales::{
     DISTANCE_SCALE_M, TARGET_SETS, TIME_SCALE_FRAMES, flag, log_mass, normalize_clamped, recency,
@@ -104,18 +104,18 @@ const PERSONAS: [Persona; 5] =
     [Persona::Adult, Persona::Child, Persona::Wheelchair, Persona::Rider, Persona::Frail];
 
 /// Number of state features.
-pub const N_STATE: usize = STATE_FEATURES.len() + 3 * TARGET_SETS.len() + PERSONAS.len();
+pub const N_STATE_FEATURES: usize = STATE_FEATURES.len() + 3 * TARGET_SETS.len() + PERSONAS.len();
 /// Number of plan features.
-pub const N_PLAN: usize = N_KINDS + PLAN_FEATURES.len() + TARGET_SETS.len();
+pub const N_PLAN_FEATURES: usize = N_KINDS + PLAN_FEATURES.len() + TARGET_SETS.len();
 /// Number of additional state features with an opponent model: goal probabilities and limits.
-pub const N_OPPONENT_STATE: usize = N_GOALS + N_LIMITS;
+pub const N_OPPONENT_STATE_FEATURES: usize = N_GOALS + N_BODY_LIMITS;
 /// Number of additional plan features with an opponent model. They are the probability that the
 /// plan's class is the partner's target, given the goal to pick up, and its product with the
 /// probability of that goal.
-pub const N_OPPONENT_PLAN: usize = 2;
+pub const N_OPPONENT_PLAN_FEATURES: usize = 2;
 /// Number of additional plan features with the infer hint: whether the helper `infer` would choose
 /// the plan.
-pub const N_PROPOSAL_PLAN: usize = 1;
+pub const N_INFER_HINT_FEATURES: usize = 1;
 /// Number of kinds of plans.
 const N_KINDS: usize = Plan::KINDS.len();
 
@@ -282,7 +282,7 @@ impl FeatureEncoder {
         let OpponentPrediction { goals, limits, .. } = &prediction;
         encoded.state.extend(goals);
         encoded.state.extend(limits);
-        let rows = encoded.candidates.chunks_exact(N_PLAN).zip(candidates);
+        let rows = encoded.candidates.chunks_exact(N_PLAN_FEATURES).zip(candidates);
         let target_probability =
             |plan: &Plan| Some(opponent.target_probability(&prediction, plan.subject()?.class));
         encoded.candidates = rows
@@ -398,7 +398,7 @@ fn encode_plans(
         available,
     };
     let mut has_kind = [false; N_KINDS];
-    let mut features = Vec::with_capacity(valid.len() * N_PLAN);
+    let mut features = Vec::with_capacity(valid.len() * N_PLAN_FEATURES);
     for plan in valid {
         let is_first = !std::mem::replace(&mut has_kind[plan.kind()], true);
         shared.push_plan(plan, is_first, &mut features);
@@ -490,6 +490,6 @@ impl DecisionContext<'_> {
         let obstacle = object.filter(is_obstacle);
         to.push(flag(obstacle.is_some_and(|t| stands_in_passage(&self.memory.map, t))));
         to.extend(TARGET_SETS.iter().map(|set| flag(info.is_some_and(|i| i.sets.contains(set)))));
-        debug_assert_eq!(to.len() - start, N_PLAN);
+        debug_assert_eq!(to.len() - start, N_PLAN_FEATURES);
     }
 }

@@ -77,15 +77,15 @@ impl OpponentGoal {
 }
 
 /// Number of values that describe the limits of a body.
-pub const N_LIMITS: usize = 5;
+pub const N_BODY_LIMITS: usize = 5;
 /// Names of the limits, in order.
-pub const LIMITS: [&str; N_LIMITS] =
+pub const LIMITS: [&str; N_BODY_LIMITS] =
     ["reaches_high", "reaches_low", "strength", "no_bicycle", "no_wheelchair"];
 
 /// Returns physical limits of a body, each from 0 (constrained) to 1 (unconstrained). They are the
 /// maximum height (1.5 to 3 m), the minimum height (0.25 to 0 m), the strength (100 to 600 kg), and
 /// the absence of a bicycle and of a wheelchair. The ranges are those of the original's data.
-pub fn limits(body: &Capability) -> [f32; N_LIMITS] {
+pub fn limits(body: &Capability) -> [f32; N_BODY_LIMITS] {
     let [low_m, high_m] = body.pick_range_m;
     let flag = |condition: bool| f32::from(u8::from(condition));
     let values = [(high_m - 1.5) / 1.5, (0.25 - low_m) / 0.25, (body.strength_kg - 100.0) / 500.0];

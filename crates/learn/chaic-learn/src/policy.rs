@@ -13,7 +13,7 @@ use chaic_core::observation::Grants;
 use chaic_core::rng::RngStream;
 use chaic_core::{AgentError, AgentId, Briefing, Frame, Observation};
 use chaic_env::helper_registry::Helper;
-use chaic_nn::Pass;
+use chaic_nn::TrainingPass;
 
 use crate::actor_critic::{ActorCritic as _, ActorCriticOutput};
 use crate::candidate_scorer::CandidateSet;
@@ -87,7 +87,7 @@ pub struct LearnedPolicy {
     weights: Arc<PolicyWeights>,
     selection: ActionSelection,
     log: Option<StepLog>,
-    pass: Pass,
+    pass: TrainingPass,
     rng: RngStream,
     features: FeatureEncoder,
 }

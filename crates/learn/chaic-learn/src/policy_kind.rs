@@ -7,10 +7,10 @@ use chaic_core::observation::Grants;
 use chaic_nn::weights::{self, WeightsError};
 
 use crate::candidate_scorer::CandidateScorer;
-use crate::decision_memory::N_MEMORY_PLAN;
+use crate::decision_memory::N_MEMORY_PLAN_FEATURES;
 use crate::features::{
-    FeatureEncoder, N_OPPONENT_PLAN, N_OPPONENT_STATE, N_PLAN, N_PROPOSAL_PLAN, N_STATE,
-    OptionalInputs,
+    FeatureEncoder, N_INFER_HINT_FEATURES, N_OPPONENT_PLAN_FEATURES, N_OPPONENT_STATE_FEATURES,
+    N_PLAN_FEATURES, N_STATE_FEATURES, OptionalInputs,
 };
 use crate::opponent::network::{self, OPPONENT, OpponentInput, OpponentModel};
 
@@ -48,11 +48,14 @@ impl PolicyKind {
     /// Returns the number of state features and the number of features per plan.
     pub fn n_features(self) -> (usize, usize) {
         let (n_state, n_plan) = match self.opponent {
-            OpponentInput::None => (N_STATE, N_PLAN),
-            _ => (N_STATE + N_OPPONENT_STATE, N_PLAN + N_OPPONENT_PLAN),
+            OpponentInput::None => (N_STATE_FEATURES, N_PLAN_FEATURES),
+            _ => (
+                N_STATE_FEATURES + N_OPPONENT_STATE_FEATURES,
+                N_PLAN_FEATURES + N_OPPONENT_PLAN_FEATURES,
+            ),
         };
-        let n_proposal = if self.has_infer_hint { N_PROPOSAL_PLAN } else { 0 };
-        let n_memory = if self.memory > 0 { N_MEMORY_PLAN } else { 0 };
+        let n_proposal = if self.has_infer_hint { N_INFER_HINT_FEATURES } else { 0 };
+        let n_memory = if self.memory > 0 { N_MEMORY_PLAN_FEATURES } else { 0 };
         (n_state, n_plan + n_proposal + n_memory)
     }
 

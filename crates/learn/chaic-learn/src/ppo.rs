@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use chaic_core::geom::math;
 use chaic_core::rng::RngStream;
 use chaic_nn::simd::widest;
-use chaic_nn::{AdamWConfig, Pass};
+use chaic_nn::{AdamWConfig, TrainingPass};
 use chaic_training::bounds::{
     ADAM, Bound, BoundTable, FRACTION, LEARNING_RATE, SHARDS, integer, real,
 };
@@ -253,7 +253,7 @@ pub fn update<M: ActorCritic>(
             if stop.load(Ordering::Relaxed) {
                 return;
             }
-            let mut pass = Pass::new(model.network(), widest());
+            let mut pass = TrainingPass::new(model.network(), widest());
             let observations = batch.iter().map(|s| &s.transition.observation);
             let outputs = model.forward(reference, observations, &mut pass);
             batch.iter_mut().zip(outputs).for_each(|(s, output)| s.reference = output.log_probs);

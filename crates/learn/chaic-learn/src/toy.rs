@@ -6,13 +6,13 @@ use chaic_core::rng::RngStream;
 
 use crate::actor_critic::ActorCritic as _;
 use crate::candidate_scorer::{CandidateScorer, CandidateSet};
-use crate::decision_memory::{DecisionMemory, N_MEMORY_PLAN};
+use crate::decision_memory::{DecisionMemory, N_MEMORY_PLAN_FEATURES};
 use crate::ppo::{Trajectory, Transition};
 
 /// Task with a few actions, all of which are always allowed.
 pub trait ToyTask {
     /// Number of state features.
-    const N_STATE: usize;
+    const N_STATE_FEATURES: usize;
     /// Number of actions.
     const N_ACTIONS: usize;
     /// Number of earlier decisions that the policy reads.
@@ -36,7 +36,7 @@ pub struct CartPole {
 }
 
 impl ToyTask for CartPole {
-    const N_STATE: usize = 4;
+    const N_STATE_FEATURES: usize = 4;
     const N_ACTIONS: usize = 2;
 
     fn new(rng: &mut RngStream) -> CartPole {
@@ -96,7 +96,7 @@ impl Maze {
 }
 
 impl ToyTask for Maze {
-    const N_STATE: usize = Maze::SIDE * Maze::SIDE;
+    const N_STATE_FEATURES: usize = Maze::SIDE * Maze::SIDE;
     const N_ACTIONS: usize = 4;
 
     fn new(_: &mut RngStream) -> Maze {
@@ -104,7 +104,7 @@ impl ToyTask for Maze {
     }
 
     fn state(&self) -> Vec<f32> {
-        let mut state = vec![0.0; Maze::N_STATE];
+        let mut state = vec![0.0; Maze::N_STATE_FEATURES];
         state[Maze::SIDE * self.position[1] + self.position[0]] = 1.0;
         state
     }
@@ -129,42 +129,42 @@ impl ToyTask for Maze {
 
 /// Recall of a cue: the first state shows which of two actions is right, and only the choice in the
 /// last state counts. Policies without memory have a mean return of 0.5.
-pub struct Recall {
+pub struct CueRecall {
     cue: usize,
     steps: u32,
 }
 
-impl Recall {
+impl CueRecall {
     /// Length of an episode, steps.
     const STEPS: u32 = 4;
 }
 
-impl ToyTask for Recall {
-    const N_STATE: usize = 2;
+impl ToyTask for CueRecall {
+    const N_STATE_FEATURES: usize = 2;
     const N_ACTIONS: usize = 2;
     const MEMORY: usize = 4;
 
-    fn new(rng: &mut RngStream) -> Recall {
-        Recall { cue: usize::from(rng.chance(0.5)), steps: 0 }
+    fn new(rng: &mut RngStream) -> CueRecall {
+        CueRecall { cue: usize::from(rng.chance(0.5)), steps: 0 }
     }
 
     fn state(&self) -> Vec<f32> {
-        let is_last = f32::from(u8::from(self.steps + 1 == Recall::STEPS));
+        let is_last = f32::from(u8::from(self.steps + 1 == CueRecall::STEPS));
         let cue = if self.steps == 0 { self.cue as f32 * 2.0 - 1.0 } else { 0.0 };
         vec![cue, is_last]
     }
 
     fn step(&mut self, action: usize) -> (f32, bool) {
         self.steps += 1;
-        let is_last = self.steps == Recall::STEPS;
+        let is_last = self.steps == CueRecall::STEPS;
         (f32::from(u8::from(is_last && action == self.cue)), !is_last)
     }
 }
 
 /// Creates a network for a task.
 pub fn network<T: ToyTask>(width: usize) -> CandidateScorer {
-    let n_memory = if T::MEMORY > 0 { N_MEMORY_PLAN } else { 0 };
-    CandidateScorer::new(T::N_STATE, T::N_ACTIONS + n_memory, width, 1)
+    let n_memory = if T::MEMORY > 0 { N_MEMORY_PLAN_FEATURES } else { 0 };
+    CandidateScorer::new(T::N_STATE_FEATURES, T::N_ACTIONS + n_memory, width, 1)
 }
 
 /// Encodes a decision between all actions, each by a one-hot vector.
@@ -284,7 +284,7 @@ mod tests {
             learning_rate: 2e-3,
             ..PpoConfig::default()
         };
-        let (_, returns) = train::<Recall>(&config, 20, 512);
+        let (_, returns) = train::<CueRecall>(&config, 20, 512);
         let mean_return = returns.iter().sum::<f32>() / returns.len() as f32;
         assert!(mean_return > 0.95, "{mean_return}");
     }

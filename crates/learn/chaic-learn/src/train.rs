@@ -17,7 +17,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use crate::candidate_scorer::{CandidateScorer, CandidateSet};
-use crate::decision_memory::N_MEMORY_PLAN;
+use crate::decision_memory::N_MEMORY_PLAN_FEATURES;
 use crate::opponent::network::OpponentModel;
 use crate::policy_kind::{PolicyKind, PolicyWeights};
 use crate::ppo::{PPO_BOUNDS, PpoConfig, Schedule, update};
@@ -98,7 +98,7 @@ impl TrainState {
     fn update_normalizer<'a>(&mut self, decisions: impl Iterator<Item = &'a CandidateSet> + Clone) {
         // The features that mark earlier decisions are zero for candidates, so they are not
         // normalized.
-        let n_raw = if self.kind.memory > 0 { N_MEMORY_PLAN } else { 0 };
+        let n_raw = if self.kind.memory > 0 { N_MEMORY_PLAN_FEATURES } else { 0 };
         self.model.update_normalizer(&mut self.learner.parameters, decisions, n_raw);
     }
 

@@ -5,7 +5,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use chaic_nn::conv::{self, Im2colBuffers};
-use chaic_nn::depthwise::{self, Padded, Zeros};
+use chaic_nn::depthwise::{self, PaddedMap, ZeroRow};
 use chaic_nn::gemm::{Matrix, Workspace, gemm};
 use chaic_nn::simd::widest;
 use chaic_nn::{Kernel, Shape, TensorView};
@@ -58,7 +58,7 @@ fn main() {
         let mut weights = vec![0.1; size * size * channels];
         let gmac = 1e-9 * (shape.len_per_item() * size * size) as f64;
         let input = TensorView::new(&map, shape);
-        let (mut padded, mut zeros) = (Padded::default(), Zeros::default());
+        let (mut padded, mut zeros) = (PaddedMap::default(), ZeroRow::default());
         let s = min_time_s(|| {
             depthwise::forward(arch, input, &weights, size, &mut out, &mut zeros);
         });

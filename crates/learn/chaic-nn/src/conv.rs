@@ -5,8 +5,8 @@ use std::ops::Range;
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::gemm::{
-    Accumulate, Matrix, PackedMatrix, Rows, TileKernel, Workspace, gemm, load_tile, multiply_add,
-    run_in_tiles, store_tile,
+    AccumulatorInit, Matrix, PackedMatrix, Rows, TileKernel, Workspace, gemm, load_tile,
+    multiply_add, run_in_tiles, store_tile,
 };
 use crate::tensor::{Shape, TensorView};
 
@@ -160,7 +160,7 @@ impl TileKernel for ForwardRows<'_> {
     fn run<S: Simd, const ROWS: usize, const VECTORS: usize>(self, simd: S) {
         let ForwardRows { map, weights, kernel, bias, out, rows, edges } = self;
         let TensorView { data: map, shape } = map;
-        let bias = bias.map_or(Accumulate::Zero, Accumulate::Row);
+        let bias = bias.map_or(AccumulatorInit::Zero, AccumulatorInit::Row);
         let windows = Windows::new(shape, kernel);
         let (row_len, out_channels) = (kernel.size * shape.channels, weights.columns());
         windows.copy_edges(map, rows.clone(), edges);
@@ -176,7 +176,7 @@ impl TileKernel for ForwardRows<'_> {
                     let first_row = (0..kernel.size).find(|dy| windows.row(y, *dy).is_some());
                     let is_first =
                         offset == 0 && first_row.is_some_and(|dy| kernel_rows.contains(&dy));
-                    let init = if is_first { bias } else { Accumulate::Output };
+                    let init = if is_first { bias } else { AccumulatorInit::Output };
                     for (t, out) in out.chunks_mut(ROWS * out_channels).enumerate() {
                         let mut sums =
                             load_tile::<S, ROWS, VECTORS>(simd, init, out, column, out_channels);

@@ -13,9 +13,9 @@ pub const CHANNEL_MULTIPLE: usize = 16;
 
 /// Row of zeros, read above and below a map.
 #[derive(Clone, Debug, Default)]
-pub struct Zeros(Vec<f32>);
+pub struct ZeroRow(Vec<f32>);
 
-impl Zeros {
+impl ZeroRow {
     fn row(&mut self, shape: Shape) -> &[f32] {
         self.0.resize(shape.width * shape.channels, 0.0);
         &self.0
@@ -24,9 +24,9 @@ impl Zeros {
 
 /// Buffer for one map with zero padding.
 #[derive(Clone, Debug, Default)]
-pub struct Padded(Vec<f32>);
+pub struct PaddedMap(Vec<f32>);
 
-impl Padded {
+impl PaddedMap {
     fn fill(&mut self, map: &[f32], shape: Shape, border: usize) -> &[f32] {
         let padded_row_len = (shape.width + 2 * border) * shape.channels;
         self.0.resize((shape.height + 2 * border) * padded_row_len, 0.0);
@@ -62,7 +62,7 @@ pub fn forward(
     weights: &[f32],
     kernel_size: usize,
     out: &mut [f32],
-    zeros: &mut Zeros,
+    zeros: &mut ZeroRow,
 ) {
     forward_rows(arch, map, weights, kernel_size, out, 0..map.shape.height, zeros);
 }
@@ -78,7 +78,7 @@ pub(crate) fn forward_rows(
     kernel_size: usize,
     out: &mut [f32],
     rows: Range<usize>,
-    zeros: &mut Zeros,
+    zeros: &mut ZeroRow,
 ) {
     let TensorView { data: map, shape } = map;
     check(shape, weights, kernel_size);
@@ -99,7 +99,7 @@ pub fn backward_input(
     weights: &[f32],
     kernel_size: usize,
     grad_input: &mut [f32],
-    zeros: &mut Zeros,
+    zeros: &mut ZeroRow,
 ) {
     let TensorView { data: map, shape } = grad_output;
     check(shape, weights, kernel_size);
@@ -119,7 +119,7 @@ pub fn backward_weights(
     grad_output: &[f32],
     grad_weights: &mut [f32],
     kernel_size: usize,
-    padded: &mut Padded,
+    padded: &mut PaddedMap,
 ) {
     let TensorView { data: map, shape } = input;
     check(shape, grad_weights, kernel_size);

@@ -50,7 +50,7 @@ impl<'a> Matrix<'a> {
 
 /// Initial value of the accumulators.
 #[derive(Clone, Copy, Debug)]
-pub enum Accumulate<'a> {
+pub enum AccumulatorInit<'a> {
     /// Current content of the output.
     Output,
     /// Zero.
@@ -234,8 +234,13 @@ impl TileKernel for Product<'_> {
                 for (k, right) in block.chunks_exact(depth * panels.width).enumerate() {
                     for (t, out) in out.chunks_mut(ROWS * n).enumerate() {
                         let column = k * panels.width;
-                        let mut sums =
-                            load_tile::<S, ROWS, VECTORS>(simd, Accumulate::Output, out, column, n);
+                        let mut sums = load_tile::<S, ROWS, VECTORS>(
+                            simd,
+                            AccumulatorInit::Output,
+                            out,
+                            column,
+                            n,
+                        );
                         if left.column_stride == 1 {
                             let mut rows: [&[f32]; ROWS] = [&[]; ROWS];
                             for (i, to) in rows.iter_mut().enumerate() {
@@ -351,7 +356,7 @@ fn pack_right(packed: &mut [f32], right: Matrix<'_>, rows: Range<usize>, panel: 
 #[inline(always)]
 pub(crate) fn load_tile<S: Simd, const ROWS: usize, const VECTORS: usize>(
     simd: S,
-    init: Accumulate<'_>,
+    init: AccumulatorInit<'_>,
     out: &[f32],
     column: usize,
     n: usize,
@@ -359,9 +364,11 @@ pub(crate) fn load_tile<S: Simd, const ROWS: usize, const VECTORS: usize>(
     let width = (VECTORS * S::F32_LANES).min(n - column);
     let mut sums = [[simd.splat_f32s(0.0); VECTORS]; ROWS];
     match init {
-        Accumulate::Zero => {}
-        Accumulate::Row(row) => sums = [load::<S, VECTORS>(simd, &row[column..][..width]); ROWS],
-        Accumulate::Output => {
+        AccumulatorInit::Zero => {}
+        AccumulatorInit::Row(row) => {
+            sums = [load::<S, VECTORS>(simd, &row[column..][..width]); ROWS]
+        }
+        AccumulatorInit::Output => {
             for (i, sums) in sums.iter_mut().enumerate() {
                 if let Some(row) = out.get(i * n + column..i * n + column + width) {
                     *sums = load::<S, VECTORS>(simd, row);

@@ -1,16 +1,16 @@
 //! Forward passes for inference. Only outputs that later layers read at other pixels are kept. All
 //! others are computed in strips that fit into the L2 cache. Results are bit-identical to those of
-//! [`Pass`](crate::Pass).
+//! [`TrainingPass`](crate::TrainingPass).
 
 use std::ops::Range;
 
 use pulp::Arch;
 
 use crate::conv::{self, ForwardRows, Kernel, STRIP_PIXELS};
-use crate::depthwise::{self, Zeros};
+use crate::depthwise::{self, ZeroRow};
 use crate::elementwise::{Relu, Sum, upsample};
 use crate::gemm::PackedMatrix;
-use crate::network::{Layer, Network, Node};
+use crate::network::{Layer, Network, NodeId};
 use crate::norm;
 use crate::tensor::{Shape, Tensor, TensorView};
 
@@ -28,7 +28,7 @@ pub struct Inference {
     /// Outputs of the layers: complete, or the current strip.
     activations: Vec<Tensor>,
     edges: Vec<f32>,
-    zeros: Zeros,
+    zeros: ZeroRow,
 }
 
 impl Inference {
@@ -36,7 +36,7 @@ impl Inference {
     ///
     /// # Panics
     /// If the network concatenates or reshapes maps or has attention, which only a
-    /// [`Pass`](crate::Pass) supports, or the number of parameters differs.
+    /// [`TrainingPass`](crate::TrainingPass) supports, or the number of parameters differs.
     pub fn new(network: &Network, parameters: &[f32], arch: Arch) -> Inference {
         let is_unsupported = |layer: &Layer| {
             matches!(
@@ -60,7 +60,7 @@ impl Inference {
             is_kept,
             activations: vec![Tensor::default(); network.layers.len()],
             edges: Vec::new(),
-            zeros: Zeros::default(),
+            zeros: ZeroRow::default(),
         }
     }
 
@@ -81,7 +81,7 @@ impl Inference {
     /// # Panics
     /// If the input has several maps, or its width or height is not a multiple of
     /// [`Network::stride`].
-    pub fn run(&mut self, mut on_strip: impl FnMut(Node, usize, &[f32])) {
+    pub fn run(&mut self, mut on_strip: impl FnMut(NodeId, usize, &[f32])) {
         let input = self.activations[0].shape;
         let stride = self.network.stride();
         assert_eq!(input.n, 1, "the input must be one map");
@@ -92,22 +92,22 @@ impl Inference {
             input.height
         );
         for segment in self.segments.clone() {
-            let shape = self.network.shape_of(Node(segment.start), input);
+            let shape = self.network.shape_of(NodeId(segment.start), input);
             for layer in segment.clone().filter(|layer| self.is_kept[*layer]) {
-                self.activations[layer].reshape(self.network.shape_of(Node(layer), input));
+                self.activations[layer].reshape(self.network.shape_of(NodeId(layer), input));
             }
             // The height of a strip is even, so that an upsampled strip starts at a full input row.
             let strip = (STRIP_PIXELS / shape.width).next_multiple_of(2).max(2);
             for top in (0..shape.height).step_by(strip) {
                 let rows = top..(top + strip).min(shape.height);
                 for layer in segment.clone() {
-                    let shape = self.network.shape_of(Node(layer), input);
+                    let shape = self.network.shape_of(NodeId(layer), input);
                     self.compute(layer, shape, rows.clone());
-                    if self.network.outputs().contains(&Node(layer)) {
+                    if self.network.outputs().contains(&NodeId(layer)) {
                         let first = if self.is_kept[layer] { top } else { 0 };
                         let row = shape.width * shape.channels;
                         let output = &self.activations[layer].data[first * row..];
-                        on_strip(Node(layer), top, &output[..rows.len() * row]);
+                        on_strip(NodeId(layer), top, &output[..rows.len() * row]);
                     }
                 }
             }
@@ -127,7 +127,7 @@ impl Inference {
         let first = if is_kept[layer] { rows.start * row } else { 0 };
         let out = &mut later[0].data[first..][..rows.len() * row];
         // Returns the same rows of another node with the same height.
-        let same_rows = |node: Node| {
+        let same_rows = |node: NodeId| {
             let map = &earlier[node.0];
             let row = map.shape.width * map.shape.channels;
             let first = if is_kept[node.0] { rows.start * row } else { 0 };
@@ -219,10 +219,9 @@ fn segments(network: &Network) -> (Vec<Range<usize>>, Vec<bool>) {
         let mut segments = Vec::new();
         let mut start = 1;
         for (k, is_kept) in is_kept.iter().enumerate().skip(1) {
-            let continues = network
-                .layers
-                .get(k + 1)
-                .is_some_and(|_| network.stride_of(Node(k + 1)) == network.stride_of(Node(start)));
+            let continues = network.layers.get(k + 1).is_some_and(|_| {
+                network.stride_of(NodeId(k + 1)) == network.stride_of(NodeId(start))
+            });
             if *is_kept || !continues {
                 segments.push(start..k + 1);
                 start = k + 1;

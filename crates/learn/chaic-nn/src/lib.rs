@@ -1,9 +1,10 @@
 //! Small neural networks on the CPU: training and inference.
 //!
 //! **What it is**: [`network::Network`] lists layers: dense and depthwise convolutions, layer
-//! normalization, attention, sums, nearest-neighbor upsampling. [`pass::Pass`] runs a network forward and
-//! backward. [`adam::AdamW`] is the optimizer. [`inference::Inference`] runs forward passes in less
-//! time and memory. Feature maps are [`tensor::Tensor`]s of shape [n, height, width, channels].
+//! normalization, attention, sums, nearest-neighbor upsampling. [`pass::TrainingPass`] runs a
+//! network forward and backward. [`adam::AdamW`] is the optimizer. [`inference::Inference`] runs
+//! forward passes in less time and memory. Feature maps are [`tensor::Tensor`]s of shape
+//! [n, height, width, channels].
 //!
 //! **What it is not**: it knows no worlds, tasks, losses or data.
 //!
@@ -36,6 +37,6 @@ mod tests;
 pub use adam::{AdamW, AdamWConfig};
 pub use conv::Kernel;
 pub use inference::Inference;
-pub use network::{Network, Node, Parameter, normal};
-pub use pass::Pass;
+pub use network::{Network, NodeId, Parameter, normal};
+pub use pass::TrainingPass;
 pub use tensor::{Shape, Tensor, TensorView};

@@ -7,9 +7,9 @@ use chaic_core::rng::RngStream;
 use crate::conv::Kernel;
 use crate::tensor::Shape;
 
-/// Output of a layer.
+/// Identifies the output of a layer of a [`Network`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Node(pub(crate) usize);
+pub struct NodeId(pub(crate) usize);
 
 /// Named tensor of trainable parameters.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,30 +31,30 @@ pub(crate) enum Layer {
     /// Input, by its index.
     Input { index: usize },
     /// Dense convolution, with an optional bias per channel.
-    Conv { from: Node, weights: usize, bias: Option<usize>, kernel: Kernel },
+    Conv { from: NodeId, weights: usize, bias: Option<usize>, kernel: Kernel },
     /// Depthwise convolution.
-    Depthwise { from: Node, weights: usize, kernel_size: usize },
+    Depthwise { from: NodeId, weights: usize, kernel_size: usize },
     /// Layer normalization of each pixel, followed by a ReLU if `relu` is set.
-    Norm { from: Node, scale: usize, shift: usize, relu: bool },
+    Norm { from: NodeId, scale: usize, shift: usize, relu: bool },
     /// ReLU.
-    Relu { from: Node },
+    Relu { from: NodeId },
     /// Sum.
-    Add { a: Node, b: Node },
+    Add { a: NodeId, b: NodeId },
     /// Nearest-neighbor upsampling by 2.
-    Upsample { from: Node },
+    Upsample { from: NodeId },
     /// Reshape: the pixels of a map, or two maps of one pixel, become one pixel.
-    Reshape { from: Node },
+    Reshape { from: NodeId },
     /// Concatenation of the channels of two maps.
-    Concat { a: Node, b: Node },
+    Concat { a: NodeId, b: NodeId },
     /// Concatenation of the channels of the previous, the same and the next row of a sequence.
-    Neighbors { from: Node, length: usize },
+    Neighbors { from: NodeId, length: usize },
     /// Multi-head attention between the rows of a group.
-    Attention { query: Node, key: Node, value: Node, n_heads: usize },
+    Attention { query: NodeId, key: NodeId, value: NodeId, n_heads: usize },
 }
 
 impl Layer {
     /// Returns the inputs of the layer.
-    pub(crate) fn inputs(&self) -> impl Iterator<Item = Node> {
+    pub(crate) fn inputs(&self) -> impl Iterator<Item = NodeId> {
         let (first, second, third) = match *self {
             Layer::Input { .. } => (None, None, None),
             Layer::Conv { from, .. }
@@ -87,15 +87,15 @@ pub struct Network {
     pub(crate) layers: Vec<Layer>,
     sizes: Vec<Size>,
     parameters: Vec<Parameter>,
-    outputs: Vec<Node>,
+    outputs: Vec<NodeId>,
     n_inputs: usize,
 }
 
 impl Network {
-    fn push(&mut self, layer: Layer, size: Size) -> Node {
+    fn push(&mut self, layer: Layer, size: Size) -> NodeId {
         self.layers.push(layer);
         self.sizes.push(size);
-        Node(self.layers.len() - 1)
+        NodeId(self.layers.len() - 1)
     }
 
     fn add_parameter(&mut self, name: String, shape: &[usize], has_weight_decay: bool) -> usize {
@@ -106,13 +106,13 @@ impl Network {
     }
 
     /// Adds an input with this many channels: the first layer of a network.
-    pub fn input(&mut self, channels: usize) -> Node {
+    pub fn input(&mut self, channels: usize) -> NodeId {
         self.auxiliary_input(channels, 1)
     }
 
     /// Adds a further input, whose width and height are those of the first input divided by
     /// `stride`.
-    pub fn auxiliary_input(&mut self, channels: usize, stride: usize) -> Node {
+    pub fn auxiliary_input(&mut self, channels: usize, stride: usize) -> NodeId {
         let index = self.n_inputs;
         self.n_inputs += 1;
         self.push(Layer::Input { index }, Size { channels, stride, maps: 1 })
@@ -133,7 +133,7 @@ impl Network {
     }
 
     /// Adds a dense convolution without bias.
-    pub fn conv(&mut self, name: &str, from: Node, kernel: Kernel, channels: usize) -> Node {
+    pub fn conv(&mut self, name: &str, from: NodeId, kernel: Kernel, channels: usize) -> NodeId {
         let input = self.sizes[from.0];
         let shape = [kernel.size, kernel.size, input.channels, channels];
         let weights = self.add_parameter(format!("{name}.weight"), &shape, true);
@@ -142,7 +142,7 @@ impl Network {
     }
 
     /// Adds an output: a pointwise convolution with a bias.
-    pub fn output_head(&mut self, name: &str, from: Node, channels: usize) -> Node {
+    pub fn output_head(&mut self, name: &str, from: NodeId, channels: usize) -> NodeId {
         let input = self.sizes[from.0];
         let shape = [1, 1, input.channels, channels];
         let weights = self.add_parameter(format!("{name}.weight"), &shape, true);
@@ -155,7 +155,7 @@ impl Network {
     }
 
     /// Adds a depthwise convolution with a kernel of 3x3 or 5x5.
-    pub fn depthwise(&mut self, name: &str, from: Node, kernel_size: usize) -> Node {
+    pub fn depthwise(&mut self, name: &str, from: NodeId, kernel_size: usize) -> NodeId {
         let size = self.sizes[from.0];
         let shape = [kernel_size, kernel_size, size.channels];
         let weights = self.add_parameter(format!("{name}.weight"), &shape, true);
@@ -163,16 +163,16 @@ impl Network {
     }
 
     /// Adds a layer normalization of each pixel.
-    pub fn norm(&mut self, name: &str, from: Node) -> Node {
+    pub fn norm(&mut self, name: &str, from: NodeId) -> NodeId {
         self.push_norm(name, from, false)
     }
 
     /// Adds a layer normalization followed by a ReLU.
-    pub fn norm_relu(&mut self, name: &str, from: Node) -> Node {
+    pub fn norm_relu(&mut self, name: &str, from: NodeId) -> NodeId {
         self.push_norm(name, from, true)
     }
 
-    fn push_norm(&mut self, name: &str, from: Node, relu: bool) -> Node {
+    fn push_norm(&mut self, name: &str, from: NodeId, relu: bool) -> NodeId {
         let size = self.sizes[from.0];
         let channels = size.channels;
         assert!(channels.is_multiple_of(crate::norm::LANES), "{channels} channels");
@@ -182,7 +182,7 @@ impl Network {
     }
 
     /// Adds a ReLU.
-    pub fn relu(&mut self, from: Node) -> Node {
+    pub fn relu(&mut self, from: NodeId) -> NodeId {
         self.push(Layer::Relu { from }, self.sizes[from.0])
     }
 
@@ -190,8 +190,8 @@ impl Network {
     ///
     /// # Panics
     /// If their shapes differ.
-    pub fn add(&mut self, a: Node, b: Node) -> Node {
-        let size = |n: Node| self.sizes[n.0];
+    pub fn add(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        let size = |n: NodeId| self.sizes[n.0];
         assert_eq!(size(a), size(b), "shapes of the summands differ");
         self.push(Layer::Add { a, b }, size(a))
     }
@@ -200,7 +200,7 @@ impl Network {
     ///
     /// # Panics
     /// If their maps have different sizes.
-    pub fn concat(&mut self, a: Node, b: Node) -> Node {
+    pub fn concat(&mut self, a: NodeId, b: NodeId) -> NodeId {
         let [size_a, size_b] = [a, b].map(|n| self.sizes[n.0]);
         let channels = size_a.channels + size_b.channels;
         assert_eq!(
@@ -212,11 +212,11 @@ impl Network {
     }
 
     /// Adds multi-head scaled dot-product attention between the rows of a group, see
-    /// [`Pass::set_groups`](crate::Pass::set_groups). Rows are maps of one pixel.
+    /// [`TrainingPass::set_groups`](crate::TrainingPass::set_groups). Rows are maps of one pixel.
     ///
     /// # Panics
     /// If the inputs have different shapes, or their channels are not a multiple of `n_heads`.
-    pub fn attention(&mut self, [query, key, value]: [Node; 3], n_heads: usize) -> Node {
+    pub fn attention(&mut self, [query, key, value]: [NodeId; 3], n_heads: usize) -> NodeId {
         let size = self.sizes[query.0];
         assert!([key, value].iter().all(|node| self.sizes[node.0] == size), "shapes differ");
         assert!(size.channels.is_multiple_of(n_heads), "{} channels", size.channels);
@@ -227,14 +227,14 @@ impl Network {
     ///
     /// # Panics
     /// If the node has the resolution of the input.
-    pub fn upsample(&mut self, from: Node) -> Node {
+    pub fn upsample(&mut self, from: NodeId) -> NodeId {
         let size = self.sizes[from.0];
         assert!(size.stride.is_multiple_of(2), "the output would be larger than the input");
         self.push(Layer::Upsample { from }, Size { stride: size.stride / 2, ..size })
     }
 
     /// Adds a reshape of maps of `map_size` x `map_size` pixels to one pixel each.
-    pub fn flatten(&mut self, from: Node, map_size: usize) -> Node {
+    pub fn flatten(&mut self, from: NodeId, map_size: usize) -> NodeId {
         let Size { channels, stride, maps } = self.sizes[from.0];
         let size =
             Size { channels: map_size * map_size * channels, stride: map_size * stride, maps };
@@ -242,7 +242,7 @@ impl Network {
     }
 
     /// Adds a reshape that concatenates two consecutive maps of one pixel in a batch.
-    pub fn concat_pairs(&mut self, from: Node) -> Node {
+    pub fn concat_pairs(&mut self, from: NodeId) -> NodeId {
         let Size { channels, stride, maps } = self.sizes[from.0];
         self.push(Layer::Reshape { from }, Size { channels: 2 * channels, stride, maps: 2 * maps })
     }
@@ -250,7 +250,7 @@ impl Network {
     /// Adds the concatenation of the channels of the previous, the same and the next row; the first
     /// and last row have zeros for the missing one. Rows are maps of one pixel; `length` consecutive
     /// rows form a sequence. With a pointwise convolution it is a convolution of size 3 over time.
-    pub fn concat_neighbors(&mut self, from: Node, length: usize) -> Node {
+    pub fn concat_neighbors(&mut self, from: NodeId, length: usize) -> NodeId {
         let size = self.sizes[from.0];
         let channels = 3 * size.channels;
         self.push(Layer::Neighbors { from, length }, Size { channels, ..size })
@@ -259,7 +259,7 @@ impl Network {
     /// Returns the shapes of all inputs, given that of the first.
     pub fn input_shapes(&self, first: Shape) -> Vec<Shape> {
         let is_input = |k: &usize| matches!(self.layers[*k], Layer::Input { .. });
-        (0..self.layers.len()).filter(is_input).map(|k| self.shape_of(Node(k), first)).collect()
+        (0..self.layers.len()).filter(is_input).map(|k| self.shape_of(NodeId(k), first)).collect()
     }
 
     /// Returns the number of parameters.
@@ -273,7 +273,7 @@ impl Network {
     }
 
     /// Returns the nodes of [`Network::output_head`] in order.
-    pub fn outputs(&self) -> &[Node] {
+    pub fn outputs(&self) -> &[NodeId] {
         &self.outputs
     }
 
@@ -283,17 +283,17 @@ impl Network {
     }
 
     /// Returns the divisor of the input's width and height for a node.
-    pub(crate) fn stride_of(&self, node: Node) -> usize {
+    pub(crate) fn stride_of(&self, node: NodeId) -> usize {
         self.sizes[node.0].stride
     }
 
     /// Returns the number of channels of a node.
-    pub(crate) fn channels_of(&self, node: Node) -> usize {
+    pub(crate) fn channels_of(&self, node: NodeId) -> usize {
         self.sizes[node.0].channels
     }
 
     /// Returns the shape of a node's output for an input shape.
-    pub fn shape_of(&self, node: Node, input: Shape) -> Shape {
+    pub fn shape_of(&self, node: NodeId, input: Shape) -> Shape {
         let Size { channels, stride, maps } = self.sizes[node.0];
         Shape {
             n: input.n / maps,

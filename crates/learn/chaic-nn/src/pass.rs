@@ -7,27 +7,27 @@ use pulp::Arch;
 
 use crate::attention::{Attention, AttentionGrad};
 use crate::conv::{self, Im2colBuffers};
-use crate::depthwise::{self, Padded, Zeros};
+use crate::depthwise::{self, PaddedMap, ZeroRow};
 use crate::elementwise::{
     AddTo, Relu, ReluGrad, Sum, add_neighbor_gradients, concat_neighbors, downsample, upsample,
 };
 use crate::gemm::PackedMatrix;
 use crate::inference::pack_weights;
-use crate::network::{Layer, Network, Node};
+use crate::network::{Layer, Network, NodeId};
 use crate::norm;
 use crate::tensor::{Shape, Tensor, TensorView};
 
 /// Activations and gradients of one pass over a batch. The next pass reuses the memory.
 #[derive(Clone, Debug)]
-pub struct Pass {
+pub struct TrainingPass {
     arch: Arch,
     /// Packed weights by layer if the parameters are constant; otherwise empty.
     packed: Arc<[PackedMatrix]>,
     activations: Vec<Tensor>,
     gradients: Vec<Tensor>,
     im2col: Im2colBuffers,
-    padded: Padded,
-    zeros: Zeros,
+    padded: PaddedMap,
+    zeros: ZeroRow,
     /// Gradient of one map.
     grad_map: Vec<f32>,
     /// Numbers of consecutive rows that attend to each other; empty if all rows attend to each
@@ -38,18 +38,18 @@ pub struct Pass {
     attention_grad: AttentionGrad,
 }
 
-impl Pass {
+impl TrainingPass {
     /// Creates the buffers for a network.
-    pub fn new(network: &Network, arch: Arch) -> Pass {
+    pub fn new(network: &Network, arch: Arch) -> TrainingPass {
         let n = network.layers.len();
-        Pass {
+        TrainingPass {
             arch,
             packed: Arc::default(),
             activations: vec![Tensor::default(); n],
             gradients: vec![Tensor::default(); n],
             im2col: Im2colBuffers::default(),
-            padded: Padded::default(),
-            zeros: Zeros::default(),
+            padded: PaddedMap::default(),
+            zeros: ZeroRow::default(),
             grad_map: Vec::new(),
             groups: Vec::new(),
             attention_weights: vec![Vec::new(); n],
@@ -60,9 +60,13 @@ impl Pass {
     /// Creates the buffers for forward passes that all use these parameters. Weights of dense
     /// convolutions are packed once, and copies share them. Later calls with other parameters still
     /// use the packed weights.
-    pub fn with_constant_parameters(network: &Network, parameters: &[f32], arch: Arch) -> Pass {
+    pub fn with_constant_parameters(
+        network: &Network,
+        parameters: &[f32],
+        arch: Arch,
+    ) -> TrainingPass {
         let packed: Arc<[PackedMatrix]> = pack_weights(network, parameters, arch).into();
-        Pass { packed, ..Pass::new(network, arch) }
+        TrainingPass { packed, ..TrainingPass::new(network, arch) }
     }
 
     /// Divides the rows of the next batches into groups of these sizes; attention layers relate the
@@ -72,26 +76,26 @@ impl Pass {
         self.groups.extend(sizes);
     }
 
-    /// Returns the group sizes of [`Pass::set_groups`].
+    /// Returns the group sizes of [`TrainingPass::set_groups`].
     pub fn groups(&self) -> &[usize] {
         &self.groups
     }
 
     /// Returns the output of a node.
-    pub fn activation(&self, node: Node) -> &Tensor {
+    pub fn activation(&self, node: NodeId) -> &Tensor {
         &self.activations[node.0]
     }
 
     /// Returns the gradient of the loss with respect to a node's output. Callers write those of the
     /// output heads.
-    pub fn gradient(&mut self, node: Node) -> &mut Tensor {
+    pub fn gradient(&mut self, node: NodeId) -> &mut Tensor {
         &mut self.gradients[node.0]
     }
 
     /// Runs all layers on an input.
     ///
     /// # Panics
-    /// As [`Pass::forward_all`].
+    /// As [`TrainingPass::forward_all`].
     pub fn forward(&mut self, network: &Network, parameters: &[f32], input: &Tensor) {
         self.forward_all(network, parameters, &[input]);
     }
@@ -103,19 +107,19 @@ impl Pass {
     /// multiple of [`Network::stride`], or the groups do not add up to the rows of an attention
     /// layer.
     pub fn forward_all(&mut self, network: &Network, parameters: &[f32], inputs: &[&Tensor]) {
-        self.forward_up_to(network, parameters, inputs, Node(network.layers.len() - 1));
+        self.forward_up_to(network, parameters, inputs, NodeId(network.layers.len() - 1));
     }
 
-    /// Runs the layers up to a node on the inputs of a network, as [`Pass::forward_all`].
+    /// Runs the layers up to a node on the inputs of a network, as [`TrainingPass::forward_all`].
     ///
     /// # Panics
-    /// As [`Pass::forward_all`].
+    /// As [`TrainingPass::forward_all`].
     pub fn forward_up_to(
         &mut self,
         network: &Network,
         parameters: &[f32],
         inputs: &[&Tensor],
-        last: Node,
+        last: NodeId,
     ) {
         let shape = inputs[0].shape;
         let Shape { height, width, .. } = shape;
@@ -128,7 +132,8 @@ impl Pass {
     }
 
     /// Runs the layers after a node on one map of a batch. The pass `batch` has run the layers up to
-    /// the node ([`Pass::forward_up_to`]). Activations are bit-identical to those of a whole batch.
+    /// the node ([`TrainingPass::forward_up_to`]). Activations are bit-identical to those of a
+    /// whole batch.
     ///
     /// # Panics
     /// If there are inputs after the node, or a layer combines maps of the batch.
@@ -136,8 +141,8 @@ impl Pass {
         &mut self,
         network: &Network,
         parameters: &[f32],
-        batch: &Pass,
-        last: Node,
+        batch: &TrainingPass,
+        last: NodeId,
         map: usize,
     ) {
         let first = last.0 + 1;
@@ -166,7 +171,7 @@ impl Pass {
         for k in layers {
             let (earlier, later) = self.activations.split_at_mut(k);
             let out = &mut later[0];
-            out.reshape(network.shape_of(Node(k), input_shape));
+            out.reshape(network.shape_of(NodeId(k), input_shape));
             match network.layers[k] {
                 Layer::Input { index } => out.data.copy_from_slice(&inputs[index].data),
                 Layer::Conv { from, weights, bias, kernel, .. } => {

@@ -4,11 +4,11 @@
 use chaic_core::rng::RngStream;
 
 use crate::simd::{widest, widths};
-use crate::{AdamW, AdamWConfig, Inference, Kernel, Network, Node, Pass, Shape, Tensor};
+use crate::{AdamW, AdamWConfig, Inference, Kernel, Network, NodeId, Shape, Tensor, TrainingPass};
 
 /// Creates a network with strided, depthwise and upsampling layers. The output has half the
 /// resolution of the input.
-fn network_with_strided_layers() -> (Network, Node) {
+fn network_with_strided_layers() -> (Network, NodeId) {
     let mut net = Network::default();
     let input = net.input(3);
     let down = net.conv("stem", input, Kernel { size: 3, stride: 2 }, 16);
@@ -25,7 +25,7 @@ fn network_with_strided_layers() -> (Network, Node) {
 }
 
 /// Creates a network that reduces two small maps to one vector.
-fn network_with_reshapes() -> (Network, Node) {
+fn network_with_reshapes() -> (Network, NodeId) {
     let mut net = Network::default();
     let input = net.input(3);
     let down = net.conv("stem", input, Kernel { size: 3, stride: 2 }, 16);
@@ -40,7 +40,7 @@ fn network_with_reshapes() -> (Network, Node) {
 }
 
 /// Creates a network that reads a map, a smaller map and a vector.
-fn network_with_inputs() -> (Network, Node) {
+fn network_with_inputs() -> (Network, NodeId) {
     let mut net = Network::default();
     let map = net.input(3);
     let small_map = net.auxiliary_input(2, 2);
@@ -58,7 +58,7 @@ fn network_with_inputs() -> (Network, Node) {
 }
 
 /// Creates a network whose rows attend to each other.
-fn network_with_attention() -> (Network, Node) {
+fn network_with_attention() -> (Network, NodeId) {
     let mut net = Network::default();
     let input = net.input(3);
     let embedding = net.conv("embedding", input, Kernel::POINTWISE, 16);
@@ -72,7 +72,7 @@ fn network_with_attention() -> (Network, Node) {
 }
 
 /// Creates a network whose rows read their neighbors in sequences of three.
-fn network_with_sequences() -> (Network, Node) {
+fn network_with_sequences() -> (Network, NodeId) {
     let mut net = Network::default();
     let input = net.input(3);
     let embedding = net.conv("embedding", input, Kernel::POINTWISE, 16);
@@ -102,21 +102,27 @@ fn inputs(net: &Network, first: Shape) -> Vec<Tensor> {
 }
 
 /// Returns the loss: the dot product of the output and fixed factors.
-fn loss(net: &Network, head: Node, parameters: &[f32], inputs: &[Tensor], factors: &Tensor) -> f64 {
-    let mut pass = Pass::new(net, widest());
+fn loss(
+    net: &Network,
+    head: NodeId,
+    parameters: &[f32],
+    inputs: &[Tensor],
+    factors: &Tensor,
+) -> f64 {
+    let mut pass = TrainingPass::new(net, widest());
     pass.forward_all(net, parameters, &inputs.iter().collect::<Vec<_>>());
     let output = &pass.activation(head).data;
     output.iter().zip(&factors.data).map(|(x, f)| f64::from(*x) * f64::from(*f)).sum()
 }
 
 fn gradient(
-    network: &(Network, Node),
+    network: &(Network, NodeId),
     input: Shape,
     parameters: &[f32],
     arch: pulp::Arch,
 ) -> Vec<f32> {
     let (net, head) = (&network.0, network.1);
-    let mut pass = Pass::new(net, arch);
+    let mut pass = TrainingPass::new(net, arch);
     let inputs = inputs(net, input);
     pass.forward_all(net, parameters, &inputs.iter().collect::<Vec<_>>());
     pass.zero_gradients();
@@ -136,7 +142,7 @@ fn gradients_agree_with_finite_differences() {
     check_gradients(&network_with_sequences(), ROWS);
 }
 
-fn check_gradients(network: &(Network, Node), shape: Shape) {
+fn check_gradients(network: &(Network, NodeId), shape: Shape) {
     let (net, head) = (&network.0, network.1);
     let mut parameters = net.init_parameters(3);
     // Scales and shifts are perturbed, so that no activation lies at the kink of a ReLU.
@@ -193,10 +199,10 @@ fn passes_with_constant_parameters_are_bit_identical() {
         let parameters = net.init_parameters(3);
         let inputs = inputs(&net, first);
         let inputs: Vec<&Tensor> = inputs.iter().collect();
-        let mut expected = Pass::new(&net, widest());
+        let mut expected = TrainingPass::new(&net, widest());
         expected.forward_all(&net, &parameters, &inputs);
         for (name, arch) in widths() {
-            let mut pass = Pass::with_constant_parameters(&net, &parameters, arch);
+            let mut pass = TrainingPass::with_constant_parameters(&net, &parameters, arch);
             for _ in 0..2 {
                 pass.forward_all(&net, &parameters, &inputs);
                 assert!(pass.activation(head) == expected.activation(head), "{name}");
@@ -213,13 +219,13 @@ fn maps_that_run_alone_after_any_node_are_bit_identical_to_those_of_the_batch() 
         let parameters = net.init_parameters(3);
         let inputs = inputs(&net, first);
         let inputs: Vec<&Tensor> = inputs.iter().collect();
-        let mut whole = Pass::new(&net, widest());
+        let mut whole = TrainingPass::new(&net, widest());
         whole.forward_all(&net, &parameters, &inputs);
         let expected = whole.activation(head);
-        for last in (inputs.len() - 1..head.0).map(Node) {
-            let mut batch = Pass::new(&net, widest());
+        for last in (inputs.len() - 1..head.0).map(NodeId) {
+            let mut batch = TrainingPass::new(&net, widest());
             batch.forward_up_to(&net, &parameters, &inputs, last);
-            let mut single = Pass::with_constant_parameters(&net, &parameters, widest());
+            let mut single = TrainingPass::with_constant_parameters(&net, &parameters, widest());
             let maps = expected.data.chunks_exact(expected.shape.len_per_item());
             for (map, expected) in maps.enumerate().rev() {
                 single.forward_map_after(&net, &parameters, &batch, last, map);
@@ -236,7 +242,7 @@ fn rows_read_their_neighbors_in_their_own_sequence_only() {
     let neighbors = net.concat_neighbors(input, 3);
     let shape = Shape { n: 6, height: 1, width: 1, channels: 1 };
     let rows = Tensor { shape, data: vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0] };
-    let mut pass = Pass::new(&net, widest());
+    let mut pass = TrainingPass::new(&net, widest());
     pass.forward(&net, &[], &rows);
     let expected = [
         [0.0, 1.0, 2.0],
@@ -255,7 +261,7 @@ fn a_network_learns() {
     let (net, head) = network_with_strided_layers();
     let mut parameters = net.init_parameters(5);
     let (mut adam, config) = (AdamW::new(parameters.len()), AdamWConfig::default());
-    let mut pass = Pass::new(&net, widest());
+    let mut pass = TrainingPass::new(&net, widest());
     let mut losses = Vec::new();
     for step in 0..60 {
         let input = random(INPUT, 100 + step);
@@ -294,7 +300,7 @@ fn inference_is_bit_identical_to_a_pass_at_every_width() {
     // Strips that end within the map, and one that covers it.
     for (height, width) in [(12, 8), (160, 96), (8, 516)] {
         let input = random(Shape { n: 1, height, width, channels: 3 }, 1);
-        let mut pass = Pass::new(&net, widest());
+        let mut pass = TrainingPass::new(&net, widest());
         pass.forward(&net, &parameters, &input);
         for (name, arch) in widths() {
             let mut inference = Inference::new(&net, &parameters, arch);

@@ -3,7 +3,7 @@
 use std::thread;
 
 use chaic_nn::simd::widest;
-use chaic_nn::{AdamW, AdamWConfig, Network, Pass};
+use chaic_nn::{AdamW, AdamWConfig, Network, TrainingPass};
 
 use crate::checkpoint::{Checkpoint, CheckpointError};
 
@@ -37,7 +37,7 @@ pub struct Learner {
 
 /// Activations and gradient of one shard of a batch.
 struct Shard {
-    pass: Pass,
+    pass: TrainingPass,
     grad_parameters: Vec<f32>,
 }
 
@@ -55,7 +55,7 @@ impl Learner {
         let parameters = network.init_parameters(seed);
         let adam = AdamW::new(parameters.len());
         let shard = |_| Shard {
-            pass: Pass::new(network, widest()),
+            pass: TrainingPass::new(network, widest()),
             grad_parameters: vec![0.0; parameters.len()],
         };
         let shards = (0..n_shards).map(shard).collect();
@@ -183,7 +183,7 @@ impl Learner {
         network: &Network,
         config: &AdamWConfig,
         learning_rate: f32,
-        shard_gradient: impl Fn(usize, &[f32], &mut Pass, &mut [f32]) -> Option<R> + Sync,
+        shard_gradient: impl Fn(usize, &[f32], &mut TrainingPass, &mut [f32]) -> Option<R> + Sync,
     ) -> Option<Vec<R>> {
         self.step_if(network, config, learning_rate, shard_gradient, |_| true)
     }
@@ -195,7 +195,7 @@ impl Learner {
         network: &Network,
         config: &AdamWConfig,
         learning_rate: f32,
-        shard_gradient: impl Fn(usize, &[f32], &mut Pass, &mut [f32]) -> Option<R> + Sync,
+        shard_gradient: impl Fn(usize, &[f32], &mut TrainingPass, &mut [f32]) -> Option<R> + Sync,
         accepts: impl FnOnce(&[R]) -> bool,
     ) -> Option<Vec<R>> {
         let (parameters, shard_gradient) = (&self.parameters[..], &shard_gradient);

@@ -25,14 +25,22 @@ pub fn changed_setting(recorded: &Settings, current: &Settings, event: &str) -> 
     })
 }
 
+/// Returns the values of a configuration, as its file has them.
+///
+/// # Panics
+/// If the configuration is no table with TOML values.
+pub fn to_table(config: &impl Serialize) -> Table {
+    let text = toml::to_string(config).expect("a checked configuration serializes to TOML");
+    text.parse().expect("serialized TOML can be parsed")
+}
+
 /// Returns the values of these keys of a configuration, as its file has them. The key of a table stands for
 /// all keys of the table.
 ///
 /// # Panics
 /// If a key has no value.
 pub(crate) fn values(config: &impl Serialize, keys: &[&str]) -> Settings {
-    let text = toml::to_string(config).expect("a checked configuration serializes to TOML");
-    let root = Value::Table(text.parse::<Table>().expect("serialized TOML can be parsed"));
+    let root = Value::Table(to_table(config));
     let mut settings = Settings::new();
     for key in keys {
         let value = key.split('.').try_fold(&root, |table, name| table.get(name));

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use chaic_nn::simd::widest;
-use chaic_nn::{Inference, Pass, Shape, Tensor};
+use chaic_nn::{Inference, Shape, Tensor, TrainingPass};
 use chaic_vision::detector::Detector;
 use chaic_vision::features::N_FEATURES;
 use chaic_vision::trained::TrainedDetector;
@@ -45,7 +45,7 @@ fn main() {
     for (n, side) in [(1, 512), (4, 256)] {
         let shape = Shape { n, height: side, width: side, channels: N_FEATURES };
         let input = Tensor { shape, data: vec![0.1; shape.len()] };
-        let mut pass = Pass::new(net, widest());
+        let mut pass = TrainingPass::new(net, widest());
         let mut grad_parameters = vec![0.0; net.n_parameters()];
         report(&format!("forward pass, {n} of {side}x{side}"), 5, || {
             pass.forward(net, &parameters, &input);

@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use chaic_agents::perception_factory::GroundTruthPerceptionFactory;
 use chaic_vision::behavior::Behavior;
-use chaic_vision::behavior::clip::{CROPS, Counts};
+use chaic_vision::behavior::clip::{CROPS, ClipCounts};
 use chaic_vision::behavior::collect::{Collector, collect};
 use chaic_vision::behavior::config::ClipCollectionConfig;
 use chaic_vision::behavior::crop::SIDE;
@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (split, perception) = (DatasetSplit::Train, &GroundTruthPerceptionFactory);
     let collector = Collector { split, config: &config, perception, n_threads: 2, folder: None };
     let start = std::time::Instant::now();
-    let mut progress = |n: usize, counts: &Counts| {
+    let mut progress = |n: usize, counts: &ClipCounts| {
         println!("{n} episodes, {:.0} s: {counts:?}", start.elapsed().as_secs_f64());
     };
     let clips = collect(&collector, &mut progress, &AtomicBool::new(false))?;

@@ -2,7 +2,7 @@
 //! levels, and a head at half the image's resolution. The head predicts a label and an offset to
 //! the object's center for each pixel.
 
-use chaic_nn::{Kernel, Network, Node};
+use chaic_nn::{Kernel, Network, NodeId};
 use serde::{Deserialize, Serialize};
 
 use crate::features::N_FEATURES;
@@ -20,7 +20,7 @@ const EXPANSION: usize = 2;
 /// Type of the encoder's residual blocks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Blocks {
+pub enum BlockType {
     /// Depthwise 5x5 convolution and an inverted bottleneck (Liu et al. 2022). The bundled detector
     /// uses it.
     #[default]
@@ -29,13 +29,13 @@ pub enum Blocks {
     Dense,
 }
 
-impl Blocks {
+impl BlockType {
     /// Number of blocks at 1/4, 1/8, 1/16 and 1/32 of the resolution: 2.5 billion multiplications
     /// for 512x512 pixels, 2.8 billion with dense blocks.
     fn per_stage(self) -> [usize; 4] {
         match self {
-            Blocks::Depthwise => [1, 2, 3, 2],
-            Blocks::Dense => [1, 1, 2, 1],
+            BlockType::Depthwise => [1, 2, 3, 2],
+            BlockType::Dense => [1, 1, 2, 1],
         }
     }
 }
@@ -48,7 +48,7 @@ pub struct Detector {
     /// Output of each pixel: [`n_labels`] logits, then [`N_OFFSETS`] components of the offset from
     /// the surface to the center of the visible part of the object. Offsets are in the camera's
     /// frame (x right, y up, z towards the camera), in units of half the class's largest extent.
-    pub head: Node,
+    pub head: NodeId,
 }
 
 /// Components of an offset.
@@ -63,11 +63,11 @@ impl Default for Detector {
 impl Detector {
     /// Creates the network that is trained and bundled.
     pub fn new() -> Detector {
-        Detector::with_blocks(Blocks::Depthwise)
+        Detector::with_blocks(BlockType::Depthwise)
     }
 
     /// Creates a network with the given blocks.
-    pub fn with_blocks(blocks: Blocks) -> Detector {
+    pub fn with_blocks(blocks: BlockType) -> Detector {
         let mut net = Network::default();
         let input = net.input(N_FEATURES);
         let downsample = Kernel { size: 3, stride: 2 };
@@ -83,8 +83,10 @@ impl Detector {
             for k in 0..n_blocks {
                 let name = format!("{name}.block{k}");
                 features = match blocks {
-                    Blocks::Depthwise => inverted_bottleneck(&mut net, &name, features, channels),
-                    Blocks::Dense => dense_block(&mut net, &name, features, channels),
+                    BlockType::Depthwise => {
+                        inverted_bottleneck(&mut net, &name, features, channels)
+                    }
+                    BlockType::Dense => dense_block(&mut net, &name, features, channels),
                 };
             }
             levels.push(features);
@@ -114,9 +116,9 @@ impl Detector {
 pub(crate) fn inverted_bottleneck(
     net: &mut Network,
     name: &str,
-    from: Node,
+    from: NodeId,
     channels: usize,
-) -> Node {
+) -> NodeId {
     let spatial = net.depthwise(&format!("{name}.depthwise"), from, 5);
     let spatial = net.norm(&format!("{name}.norm"), spatial);
     let wide = net.conv(&format!("{name}.wide"), spatial, Kernel::POINTWISE, EXPANSION * channels);
@@ -126,14 +128,19 @@ pub(crate) fn inverted_bottleneck(
 }
 
 /// Dense convolution with a residual connection (He et al. 2016).
-fn dense_block(net: &mut Network, name: &str, from: Node, channels: usize) -> Node {
+fn dense_block(net: &mut Network, name: &str, from: NodeId, channels: usize) -> NodeId {
     let norm = net.norm_relu(&format!("{name}.norm"), from);
     let dense = net.conv(&format!("{name}.dense"), norm, Kernel { size: 3, stride: 1 }, channels);
     net.add(from, dense)
 }
 
 /// Cheaper block for the decoder at high resolution: the inner width equals the outer width.
-pub(crate) fn decoder_block(net: &mut Network, name: &str, from: Node, channels: usize) -> Node {
+pub(crate) fn decoder_block(
+    net: &mut Network,
+    name: &str,
+    from: NodeId,
+    channels: usize,
+) -> NodeId {
     let spatial = net.depthwise(&format!("{name}.depthwise"), from, 3);
     let spatial = net.norm_relu(&format!("{name}.norm"), spatial);
     let mixed = net.conv(&format!("{name}.mixed"), spatial, Kernel::POINTWISE, channels);

@@ -86,7 +86,7 @@ mod tests {
     use chaic_agents::perception::SegmentMeasurement;
     use chaic_agents::track::TrackId;
     use chaic_core::geom::{Camera, forward, yaw_rotation};
-    use chaic_core::observation::{Granted, Images, Proprioception};
+    use chaic_core::observation::{GrantedInfo, Images, Proprioception};
     use chaic_core::{AgentId, ClassId, FailureReason};
 
     use super::*;
@@ -114,7 +114,7 @@ mod tests {
             },
             images: Images::default(),
             frame_history: Vec::new(),
-            granted: Granted::default(),
+            granted: GrantedInfo::default(),
         }
     }
 

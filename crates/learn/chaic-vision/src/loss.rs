@@ -51,7 +51,7 @@ impl Default for LossConfig {
 
 /// Targets of a crop, at half its resolution.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Targets {
+pub struct CropTargets {
     /// Label of each pixel.
     pub labels: Vec<u8>,
     /// Weight of each pixel.
@@ -76,7 +76,7 @@ fn power(x: f32, exponent: f32) -> f32 {
     result
 }
 
-impl Targets {
+impl CropTargets {
     /// Appends the targets of a crop.
     pub fn add(&mut self, view: &LabeledView, crop: ImageCrop, config: &LossConfig) {
         let width = view.camera.width as usize;
@@ -184,7 +184,12 @@ pub(crate) fn ln(x: f32) -> f32 {
 }
 
 /// Computes the loss of the head's output and its gradient.
-pub fn loss(head: &Tensor, targets: &Targets, config: &LossConfig, gradient: &mut Tensor) -> Loss {
+pub fn loss(
+    head: &Tensor,
+    targets: &CropTargets,
+    config: &LossConfig,
+    gradient: &mut Tensor,
+) -> Loss {
     let channels = head.shape.channels;
     let n_labels = channels - N_OFFSETS;
     let total_weight: f32 = targets.weights.iter().sum::<f32>().max(1.0);

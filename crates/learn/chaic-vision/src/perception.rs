@@ -189,8 +189,8 @@ impl Tracking {
         self.tracker.mask_movables(depth_m, camera, STRIDE, &mut dynamic_mask);
         self.last = detections.iter().map(|d| (d.track, d.pixel)).collect();
         self.last.extend(self.tracker.missed(frame, depth_m, camera));
-        let withdrawn = self.tracker.withdraw();
-        Percepts { detections, dynamic_mask, stride: STRIDE, withdrawn, ..Percepts::default() }
+        let retracted = self.tracker.take_retracted();
+        Percepts { detections, dynamic_mask, stride: STRIDE, retracted, ..Percepts::default() }
     }
 
     /// Finds the pixels of the tracks in an image whose detections are those of a keyframe.
@@ -241,7 +241,7 @@ fn measure(
 mod tests {
     use chaic_core::Vec3;
     use chaic_core::geom::{Pose, yaw_rotation};
-    use chaic_core::observation::{Granted, Images, Proprioception};
+    use chaic_core::observation::{GrantedInfo, Images, Proprioception};
 
     use super::*;
 
@@ -267,7 +267,7 @@ mod tests {
             },
             images,
             frame_history: Vec::new(),
-            granted: Granted::default(),
+            granted: GrantedInfo::default(),
         };
         let images = |n: usize, n_depth: usize| Images {
             rgb: Some(vec![100; 3 * n]),

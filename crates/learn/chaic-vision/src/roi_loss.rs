@@ -1,6 +1,6 @@
 //! Targets and loss of the detector's second stage.
 
-use chaic_nn::{Pass, Tensor};
+use chaic_nn::{Tensor, TrainingPass};
 
 use crate::detector::STRIDE;
 use crate::instances::Segment;
@@ -126,13 +126,13 @@ fn binary_cross_entropy(logit: f32, target: f32) -> f32 {
 }
 
 /// Computes the loss of the outputs in `pass` and writes its gradients there.
-pub fn roi_loss(network: &RoiNetwork, targets: &[RoiTarget], pass: &mut Pass) -> RoiLoss {
+pub fn roi_loss(network: &RoiNetwork, targets: &[RoiTarget], pass: &mut TrainingPass) -> RoiLoss {
     let RoiNetwork { labels, qualities, mask, .. } = network;
     let normalizer = 1.0 / targets.len() as f32;
     let n_objects = targets.iter().filter(|t| t.label != BACKGROUND).count();
     let object_normalizer = 1.0 / n_objects.max(1) as f32;
     let mut loss = RoiLoss::default();
-    let take = |pass: &mut Pass, node| -> (Tensor, Tensor) {
+    let take = |pass: &mut TrainingPass, node| -> (Tensor, Tensor) {
         (pass.activation(node).clone(), std::mem::take(pass.gradient(node)))
     };
     let (label_logits, mut grad_labels) = take(pass, *labels);

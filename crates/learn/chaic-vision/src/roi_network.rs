@@ -1,7 +1,7 @@
 //! Network of the detector's second stage. It classifies a proposal, predicts a refined (redrawn)
 //! mask, and predicts the IoU of each mask with the object.
 
-use chaic_nn::{Kernel, Network, Node, Shape};
+use chaic_nn::{Kernel, Network, NodeId, Shape};
 
 use crate::detector::{decoder_block, inverted_bottleneck};
 use crate::labels::n_labels;
@@ -29,11 +29,11 @@ pub struct RoiNetwork {
     /// All layers. Inputs are crops and scalars.
     pub network: Network,
     /// Logit of each label; the background is a proposal without object.
-    pub labels: Node,
+    pub labels: NodeId,
     /// Logits of the intersection over union of both masks with the object.
-    pub qualities: Node,
+    pub qualities: NodeId,
     /// Logit of each sample to belong to the object, at the crop's resolution.
-    pub mask: Node,
+    pub mask: NodeId,
 }
 
 impl Default for RoiNetwork {
@@ -64,7 +64,7 @@ impl RoiNetwork {
             }
             levels.push(features);
         }
-        let dense = |net: &mut Network, name: &str, from: Node, width: usize| {
+        let dense = |net: &mut Network, name: &str, from: NodeId, width: usize| {
             let dense = net.conv(name, from, Kernel::POINTWISE, width);
             net.norm_relu(&format!("{name}.norm"), dense)
         };

@@ -3,7 +3,7 @@
 use std::sync::atomic::AtomicBool;
 
 use chaic_core::rng::RngStream;
-use chaic_nn::{Inference, Pass, Tensor};
+use chaic_nn::{Inference, Tensor, TrainingPass};
 use chaic_training::bounds::{BoundTable, LEARNING_RATE, MAX_STEPS, STEPS, integer};
 use serde::{Deserialize, Serialize};
 
@@ -120,7 +120,7 @@ impl RoiBatch {
         &self,
         network: &RoiNetwork,
         parameters: &[f32],
-        pass: &mut Pass,
+        pass: &mut TrainingPass,
         grad_parameters: &mut [f32],
     ) -> RoiLoss {
         if self.targets.is_empty() {

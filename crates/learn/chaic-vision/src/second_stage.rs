@@ -2,7 +2,7 @@
 //! and suppresses duplicates of the same object.
 
 use chaic_nn::simd::widest;
-use chaic_nn::{Pass, Tensor};
+use chaic_nn::{Tensor, TrainingPass};
 
 use crate::instances::{Instance, Pixels, Segment};
 use crate::labels::BACKGROUND;
@@ -47,16 +47,16 @@ pub struct SecondStageInference {
     /// Crops and scalars of a batch.
     inputs: [Tensor; 2],
     /// Runs the layers of labels and qualities on a batch.
-    encoder: Pass,
+    encoder: TrainingPass,
     /// Runs the layers of the redrawn mask on one proposal.
-    mask_decoder: Pass,
+    mask_decoder: TrainingPass,
 }
 
 impl SecondStage {
     /// Creates buffers for inference with the current parameters.
     pub fn inference(&self) -> SecondStageInference {
         let network = &self.network.network;
-        let encoder = Pass::with_constant_parameters(network, &self.parameters, widest());
+        let encoder = TrainingPass::with_constant_parameters(network, &self.parameters, widest());
         let mask_decoder = encoder.clone();
         SecondStageInference { inputs: Default::default(), encoder, mask_decoder }
     }
@@ -312,7 +312,7 @@ mod tests {
             data: (0..shape.len()).map(|_| rng.range(-1.0, 1.0)).collect(),
         });
         let [crops, scalars] = &inputs;
-        let mut whole = Pass::new(&network.network, widest());
+        let mut whole = TrainingPass::new(&network.network, widest());
         whole.forward_all(&network.network, &parameters, &[crops, scalars]);
         let stage = SecondStage { network, parameters };
         let SecondStageInference { mut encoder, mut mask_decoder, .. } = stage.inference();

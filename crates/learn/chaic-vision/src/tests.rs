@@ -8,7 +8,7 @@ use chaic_core::geom::{Camera, yaw_rotation};
 use chaic_core::rng::RngStream;
 use chaic_core::{EntityId, Vec3};
 use chaic_nn::simd::widest;
-use chaic_nn::{Pass, Shape, Tensor};
+use chaic_nn::{Shape, Tensor, TrainingPass};
 
 use crate::average_precision::average_precision;
 use crate::coco::results;
@@ -17,7 +17,7 @@ use crate::evaluate::{MIN_AREA_PX, compare, report};
 use crate::features::{ImageCrop, N_FEATURES, features};
 use crate::instances::{Instance, InstanceConfig, Pixels, instances};
 use crate::labels::{BACKGROUND, class_of, label_of, n_labels};
-use crate::loss::{LossConfig, Targets, loss};
+use crate::loss::{CropTargets, LossConfig, loss};
 use crate::proposals::proposals;
 use crate::roi::{RoiBox, SIDE};
 use crate::roi_loss::{RoiTarget, ViewTruth, roi_loss};
@@ -104,7 +104,7 @@ fn loss_gradients_match_finite_differences() {
     let shape = Shape { n: 1, height: 2, width: 3, channels };
     let data = (0..shape.len()).map(|_| rng.range(-2.0, 2.0)).collect();
     let head = Tensor { shape, data };
-    let targets = Targets {
+    let targets = CropTargets {
         labels: vec![0, 3, 7, 3, 0, 9],
         weights: vec![1.0, 4.0, 0.5, 2.0, 1.0, 0.0],
         offsets: vec![[0.1, -0.2, 0.3]; 6],
@@ -382,7 +382,7 @@ fn second_stage_gradients_match_finite_differences() {
         shape,
         data: (0..shape.len()).map(|_| rng.range(-1.0, 1.0)).collect(),
     });
-    let mut pass = Pass::new(&network.network, widest());
+    let mut pass = TrainingPass::new(&network.network, widest());
     let mut loss_and_gradient = |parameters: &[f32]| {
         let [crops, scalars] = &inputs;
         pass.forward_all(&network.network, parameters, &[crops, scalars]);
@@ -453,7 +453,7 @@ fn proposals_of_a_perfect_first_stage_include_the_true_instances() {
 
 /// Returns the output of a network without errors.
 fn perfect_output(view: &LabeledView) -> Tensor {
-    let mut targets = Targets::default();
+    let mut targets = CropTargets::default();
     targets.add(view, ImageCrop::whole(&view.camera), &LossConfig::TRAINING);
     let side = view.camera.width as usize / STRIDE;
     let channels = n_labels() + N_OFFSETS;

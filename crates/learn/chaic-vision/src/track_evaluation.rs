@@ -45,7 +45,7 @@ const MAX_ERROR_M: f32 = 0.5;
 
 /// Ratio of counts with the half width of its 95 % interval over episodes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Rate {
+pub struct RateEstimate {
     /// Ratio of the sums; `None` if the denominators are 0.
     pub value: Option<f64>,
     /// Half width of the interval (linearized variance of a ratio of sums over episodes); `None` unless
@@ -55,9 +55,9 @@ pub struct Rate {
     pub n: usize,
 }
 
-impl Rate {
+impl RateEstimate {
     /// Computes the ratio from the numerator and denominator of each episode.
-    pub(crate) fn new(counts: impl Iterator<Item = [usize; 2]> + Clone) -> Rate {
+    pub(crate) fn new(counts: impl Iterator<Item = [usize; 2]> + Clone) -> RateEstimate {
         let sum = |k: usize| counts.clone().map(|c| c[k]).sum::<usize>();
         let (n, n_episodes) = (sum(1), counts.clone().count() as f64);
         let value = (n > 0).then(|| sum(0) as f64 / n as f64);
@@ -67,7 +67,7 @@ impl Rate {
             let squares: f64 = residuals.map(|residual| residual * residual).sum();
             1.96 * (n_episodes / (n_episodes - 1.0) * squares).sqrt() / n as f64
         };
-        Rate { value, interval: value.filter(|_| has_interval).map(half_width), n }
+        RateEstimate { value, interval: value.filter(|_| has_interval).map(half_width), n }
     }
 }
 
@@ -82,29 +82,29 @@ pub struct TrackReport {
     /// Number of processed images.
     pub images: usize,
     /// Fraction of detections in an image that show an object of their class.
-    pub detection_precision: Rate,
+    pub detection_precision: RateEstimate,
     /// Fraction of objects of [`MIN_AREA_PX`] pixels and more that are detected with their class, by
     /// upper end of the range of distance in meters.
-    pub detection_recall_by_m: BTreeMap<u32, Rate>,
+    pub detection_recall_by_m: BTreeMap<u32, RateEstimate>,
     /// The same for all distances up to 10 m.
-    pub detection_recall: Rate,
+    pub detection_recall: RateEstimate,
     /// Fraction of objects in memory at the end that were seen at their place, by the smallest distance
     /// from which their track was detected in meters.
-    pub memory_precision_by_m: BTreeMap<u32, Rate>,
+    pub memory_precision_by_m: BTreeMap<u32, RateEstimate>,
     /// The same for all distances, also those beyond 10 m.
-    pub memory_precision: Rate,
+    pub memory_precision: RateEstimate,
     /// Fraction of the objects seen with enough pixels that are in memory at the end, by the smallest
     /// distance from which they were seen in meters.
-    pub memory_recall_by_m: BTreeMap<u32, Rate>,
+    pub memory_recall_by_m: BTreeMap<u32, RateEstimate>,
     /// The same for all distances up to 10 m.
-    pub memory_recall: Rate,
+    pub memory_recall: RateEstimate,
     /// Mean number of identity switches per object: changes of its track.
-    pub identity_switches: Rate,
+    pub identity_switches: RateEstimate,
     /// Fraction of detected people that are visible within 0.5 m of their detected position.
-    pub person_precision: Rate,
+    pub person_precision: RateEstimate,
     /// Fraction of people of [`MIN_AREA_PX`] pixels and more that are detected within 0.5 m of their
     /// position.
-    pub person_recall: Rate,
+    pub person_recall: RateEstimate,
     /// Expected calibration error of the confidences of detections; `None` without detections.
     pub calibration_error: Option<f64>,
     /// Counts by class name.
@@ -419,8 +419,9 @@ impl TrackReport {
         let lower = std::iter::once(0).chain(RANGES_M);
         let ranges = || lower.clone().zip(RANGES_M).map(|(low, high)| [low as f32, high as f32]);
         let by_m = |count: &dyn Fn(&EpisodeRecord, [f32; 2]) -> [usize; 2]| {
-            let rates = ranges().map(|range| Rate::new(records.iter().map(|r| count(r, range))));
-            RANGES_M.into_iter().zip(rates).collect::<BTreeMap<u32, Rate>>()
+            let rates =
+                ranges().map(|range| RateEstimate::new(records.iter().map(|r| count(r, range))));
+            RANGES_M.into_iter().zip(rates).collect::<BTreeMap<u32, RateEstimate>>()
         };
         let all = [0.0, RANGES_M[RANGES_M.len() - 1] as f32];
         let scored: Vec<(f32, bool)> =
@@ -437,23 +438,25 @@ impl TrackReport {
             episodes: records.len(),
             failures: Vec::new(),
             images: records.iter().map(|r| r.n_images).sum(),
-            detection_precision: Rate::new(
+            detection_precision: RateEstimate::new(
                 records.iter().map(|r| [n_correct(r), r.detections.len()]),
             ),
             detection_recall_by_m: by_m(&EpisodeRecord::detection_recall),
-            detection_recall: Rate::new(records.iter().map(|r| r.detection_recall(all))),
+            detection_recall: RateEstimate::new(records.iter().map(|r| r.detection_recall(all))),
             memory_precision_by_m: by_m(&EpisodeRecord::memory_precision),
-            memory_precision: Rate::new(records.iter().map(|r| {
+            memory_precision: RateEstimate::new(records.iter().map(|r| {
                 let matches = r.matches();
                 [matches.iter().flatten().count(), matches.len()]
             })),
             memory_recall_by_m: by_m(&EpisodeRecord::memory_recall),
-            memory_recall: Rate::new(records.iter().map(|r| r.memory_recall(all))),
-            identity_switches: Rate::new(records.iter().map(switches)),
-            person_precision: Rate::new(
+            memory_recall: RateEstimate::new(records.iter().map(|r| r.memory_recall(all))),
+            identity_switches: RateEstimate::new(records.iter().map(switches)),
+            person_precision: RateEstimate::new(
                 records.iter().map(|r| [r.people.correct, r.people.detected]),
             ),
-            person_recall: Rate::new(records.iter().map(|r| [r.people.found, r.people.visible])),
+            person_recall: RateEstimate::new(
+                records.iter().map(|r| [r.people.found, r.people.visible]),
+            ),
             calibration_error: (!scored.is_empty()).then(|| calibration_error(&scored)),
             classes,
         }

@@ -191,7 +191,7 @@ struct Track {
     last_covered: Frame,
     /// Log odds that the object exists.
     log_odds: f32,
-    /// True if it was reported and has not been withdrawn since.
+    /// True if it was reported and has not been retracted since.
     is_reported: bool,
     /// True if another agent held it when it was last seen.
     is_carried: bool,
@@ -502,7 +502,7 @@ impl Tracker {
     fn start_track(&mut self, object: &DetectedObject<'_>, now: Frame) -> usize {
         let measurement = object.measurement;
         self.tracks.push(Track {
-            id: TrackId(TrackId::FIRST_OWN.0 + self.tracks.len() as u32),
+            id: TrackId(TrackId::FIRST_SELF_ASSIGNED.0 + self.tracks.len() as u32),
             evidence: BTreeMap::new(),
             label: measurement.label(),
             position: measurement.extent.position_in_world,

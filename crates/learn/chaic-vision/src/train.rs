@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use chaic_core::rng::RngStream;
 use chaic_nn::simd::widest;
 use chaic_nn::weights::WeightsError;
-use chaic_nn::{AdamWConfig, Inference, Network, Pass, Shape, Tensor};
+use chaic_nn::{AdamWConfig, Inference, Network, Shape, Tensor, TrainingPass};
 use chaic_training::bounds::{
     ADAM, Bound, BoundTable, FRACTION, LEARNING_RATE, MAX_STEPS, SEED, SHARDS, STEPS, integer, real,
 };
@@ -17,11 +17,11 @@ use chaic_training::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::detector::{Blocks, Detector};
+use crate::detector::{BlockType, Detector};
 use crate::evaluate::{calibrate, evaluate};
 use crate::features::{ImageCrop, N_FEATURES, features};
 use crate::labels::BACKGROUND;
-use crate::loss::{Loss, LossConfig, Targets, loss};
+use crate::loss::{CropTargets, Loss, LossConfig, loss};
 use crate::roi_loss::RoiLoss;
 use crate::roi_network::RoiNetwork;
 use crate::roi_train::{ROI_BOUNDS, RoiBatch, RoiTrainingConfig, mean_roi_loss};
@@ -62,7 +62,7 @@ pub struct DetectorTrainingConfig {
     /// Parts of a batch that are processed in parallel. Their gradients are added in a fixed order.
     pub shards: usize,
     /// Blocks of the encoder. Only training can read weights with other than the default blocks.
-    pub blocks: Blocks,
+    pub blocks: BlockType,
     /// Crops of the shards, which alternate between the two.
     pub crops: [CropConfig; 2],
     /// Distribution of views.
@@ -95,7 +95,7 @@ impl DetectorTrainingConfig {
             learning_rate: 2e-3,
             warm_up: 200,
             shards: 2,
-            blocks: Blocks::Depthwise,
+            blocks: BlockType::Depthwise,
             crops: [
                 CropConfig {
                     views: 4,
@@ -131,7 +131,7 @@ pub struct Batch {
     /// Input of the network.
     pub input: Tensor,
     /// Targets of the network.
-    pub targets: Targets,
+    pub targets: CropTargets,
 }
 
 impl Batch {
@@ -276,16 +276,18 @@ impl DetectorLearner {
         let step = self.learner.adam.steps;
         let DetectorLearner { config, detector, learner, .. } = self;
         let (config, detector) = (&*config, &*detector);
-        let shard_gradient =
-            |shard: usize, parameters: &[f32], pass: &mut Pass, grad_parameters: &mut [f32]| {
-                let index = step * config.shards as u64 + shard as u64;
-                let mut views =
-                    SyntheticViews::new(DatasetSplit::Train, config.views, config.seed, index);
-                let mut rng = RngStream::new(config.seed, "crops", index);
-                let crops = &config.crops[index as usize % config.crops.len()];
-                let batch = draw_batch(&mut views, &mut rng, config, crops, stop)?;
-                Some(gradient(detector, parameters, &batch, &config.loss, pass, grad_parameters))
-            };
+        let shard_gradient = |shard: usize,
+                              parameters: &[f32],
+                              pass: &mut TrainingPass,
+                              grad_parameters: &mut [f32]| {
+            let index = step * config.shards as u64 + shard as u64;
+            let mut views =
+                SyntheticViews::new(DatasetSplit::Train, config.views, config.seed, index);
+            let mut rng = RngStream::new(config.seed, "crops", index);
+            let crops = &config.crops[index as usize % config.crops.len()];
+            let batch = draw_batch(&mut views, &mut rng, config, crops, stop)?;
+            Some(gradient(detector, parameters, &batch, &config.loss, pass, grad_parameters))
+        };
         let losses =
             learner.step(&detector.network, &config.adam, config.rate_at(step), shard_gradient)?;
         Some(mean_loss(&losses))
@@ -301,17 +303,19 @@ impl DetectorLearner {
         }
         let (config, network, first_stages) = (&*config, &*roi_network, &self.first_stages);
         let roi = &config.second_stage;
-        let shard_gradient =
-            |shard: usize, parameters: &[f32], pass: &mut Pass, grad_parameters: &mut [f32]| {
-                let index = step * config.shards as u64 + shard as u64;
-                let seed = config.seed;
-                let mut views = SyntheticViews::new(DatasetSplit::Train, config.views, seed, index);
-                let mut rng = RngStream::new(seed, "proposals", index);
-                let first_stage = first_stages[shard].lock();
-                let first_stage = &mut *first_stage.unwrap_or_else(PoisonError::into_inner);
-                let batch = RoiBatch::draw(roi, &mut views, &mut rng, first_stage, stop)?;
-                Some(batch.gradient(network, parameters, pass, grad_parameters))
-            };
+        let shard_gradient = |shard: usize,
+                              parameters: &[f32],
+                              pass: &mut TrainingPass,
+                              grad_parameters: &mut [f32]| {
+            let index = step * config.shards as u64 + shard as u64;
+            let seed = config.seed;
+            let mut views = SyntheticViews::new(DatasetSplit::Train, config.views, seed, index);
+            let mut rng = RngStream::new(seed, "proposals", index);
+            let first_stage = first_stages[shard].lock();
+            let first_stage = &mut *first_stage.unwrap_or_else(PoisonError::into_inner);
+            let batch = RoiBatch::draw(roi, &mut views, &mut rng, first_stage, stop)?;
+            Some(batch.gradient(network, parameters, pass, grad_parameters))
+        };
         let rate = learning_rate_at(step, roi.learning_rate, roi.warm_up, roi.steps);
         let losses = roi_learner.step(&network.network, &config.adam, rate, shard_gradient)?;
         Some(mean_roi_loss(&losses))
@@ -557,7 +561,7 @@ fn gradient(
     parameters: &[f32],
     batch: &Batch,
     config: &LossConfig,
-    pass: &mut Pass,
+    pass: &mut TrainingPass,
     grad_parameters: &mut [f32],
 ) -> Loss {
     let network: &Network = &detector.network;

@@ -36,7 +36,7 @@ pub enum SceneError {
 /// Options of the glTF export.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SceneOptions {
-    /// Level of detail, from 0 to [`chaic_render::geometry::FINEST`].
+    /// Level of detail, from 0 to [`chaic_render::geometry::FINEST_LEVEL`].
     pub detail: usize,
     /// Hides ceilings, to look into a house from above.
     pub hide_ceiling: bool,

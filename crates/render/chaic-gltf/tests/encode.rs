@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use chaic_core::{AgentId, EntityId, Vec3};
-use chaic_render::geometry::{FINEST, Geometry};
+use chaic_render::geometry::{FINEST_LEVEL, Geometry};
 use chaic_render::{Appearance, Scene};
 use chaic_test_kit::hostile;
 use chaic_test_kit::scenes::{house, street, world};
@@ -27,7 +27,7 @@ fn geometry_of(world: &World) -> Geometry {
 fn geometry_in(world: &World, appearance: Appearance) -> Geometry {
     let postures: Vec<_> = world.setup().agents().map(|a| world.posture(a)).collect();
     let scene = Scene::with_appearance(world.setup(), appearance);
-    scene.geometry(world.state(), &postures, FINEST)
+    scene.geometry(world.state(), &postures, FINEST_LEVEL)
 }
 
 /// Number of triangles, and the bounds of their vertices in the world.
@@ -210,7 +210,7 @@ fn every_instance_has_the_colors_that_its_factor_makes() {
 fn hostile_scenes_are_encoded() {
     for seed in 0..120 {
         let case = hostile::case(seed, None);
-        let level = case.state.objects.len() % (FINEST + 1);
+        let level = case.state.objects.len() % (FINEST_LEVEL + 1);
         let scene = Scene::with_appearance(&case.setup, case.appearance);
         let geometry = scene.geometry(&case.state, &case.postures, level);
         let cameras: Vec<_> = case.views.iter().map(|v| ("camera".to_owned(), v.camera)).collect();

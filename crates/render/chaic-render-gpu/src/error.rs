@@ -54,7 +54,7 @@ pub enum GpuError {
         "view {index} has limits of sight, which the GPU renderer cannot apply; \
          render it with chaic_render::Scene"
     )]
-    LimitedSight {
+    LimitedEyesight {
         /// Index of the view.
         index: usize,
     },

@@ -111,7 +111,7 @@ impl Gpu {
         let Some((_, first)) = views.first() else { return Ok((0, 0)) };
         // An unlimited image would show an agent more than it may see.
         if let Some(index) = views.iter().position(|(_, view)| view.sight.is_some()) {
-            return Err(GpuError::LimitedSight { index });
+            return Err(GpuError::LimitedEyesight { index });
         }
         let (first_width, first_height) = (first.camera.width, first.camera.height);
         for (index, (world, view)) in views.iter().enumerate() {

@@ -285,8 +285,8 @@ fn room_labels(world: &World, map: &Map, width_px: u32) -> Vec<TextLabel> {
 /// Returns the marker color of an object; `None` if it has no marker.
 fn marker_color(world: &World, entity: EntityId) -> Option<[u8; 3]> {
     let setup = world.setup();
-    let object = setup.thing(entity)?;
-    let state = &world.state().objects[setup.thing_index(entity)?];
+    let object = setup.object(entity)?;
+    let state = &world.state().objects[setup.object_index(entity)?];
     if state.location == ObjectLocation::Broken {
         return None;
     }
@@ -304,7 +304,7 @@ fn mark_objects(image: &mut RgbImage, world: &World, map: &Map) {
     let setup = world.setup();
     let stroke_px = (0.0028 * image.width() as f32).max(1.5);
     for entity in &setup.goal_places {
-        let Some(k) = setup.thing_index(*entity) else { continue };
+        let Some(k) = setup.object_index(*entity) else { continue };
         let (object, state) = (&setup.things[k], &world.state().objects[k]);
         let half = 0.5 * object.size_m() + 0.08;
         let corner = |x: f32, z: f32| {

@@ -21,7 +21,7 @@ pub use crate::solids::{N_LEVELS, level_for};
 pub use crate::texture::{Texture, display_from_linear};
 
 /// Finest level of detail.
-pub const FINEST: usize = N_LEVELS - 1;
+pub const FINEST_LEVEL: usize = N_LEVELS - 1;
 
 /// Geometry of one frame.
 #[derive(Clone, Debug, PartialEq)]

@@ -150,7 +150,7 @@ pub(crate) fn object_tint(setup: &Setup, index: usize) -> Option<[f32; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::FINEST;
+    use crate::geometry::FINEST_LEVEL;
     use crate::scene_frame::ClassMesh;
     use crate::solids::N_LEVELS;
     use chaic_core::{ClassId, Role};
@@ -215,7 +215,7 @@ mod tests {
     fn support_surfaces_match_the_world() {
         for object in objects() {
             let tops = chaic_world::top_surfaces(&object);
-            let mesh = object_mesh(&object, 1, FINEST);
+            let mesh = object_mesh(&object, 1, FINEST_LEVEL);
             for top in tops.iter().filter(|t| t.half[0].min(t.half[1]) > 0.02) {
                 let near = mesh.positions.iter().filter(|p| {
                     (p.y - top.center.y).abs() < 0.012
@@ -240,7 +240,7 @@ mod tests {
                 .into_iter()
                 .flat_map(|top| (0..N_STYLES).map(move |style| (top, style)))
             {
-                let mesh = object_mesh(&object, style, FINEST);
+                let mesh = object_mesh(&object, style, FINEST_LEVEL);
                 for p in &mesh.positions {
                     let d = *p - top.center;
                     let is_above = d.x.abs() < top.half[0] - 0.02
@@ -264,7 +264,7 @@ mod tests {
         let mut object = ObjectSpec::new(ClassId::named("armchair"), Vec3::ZERO, 0.0);
         object.scale = [1.2, 0.9, 1.1];
         object.seat_m = Some(0.5);
-        let mesh = object_mesh(&object, 0, FINEST);
+        let mesh = object_mesh(&object, 0, FINEST_LEVEL);
         let size = object.size_m();
         assert!((mesh.max.y - size.y).abs() < 0.02 && (mesh.max.x - 0.5 * size.x).abs() < 0.02);
         let near_seat = mesh.positions.iter().filter(|p| (p.y - 0.5).abs() < 0.01);

@@ -108,7 +108,7 @@ mod tests {
     use chaic_core::capability::{IMPAIRMENTS, ImpairmentInfo};
 
     use super::*;
-    use crate::geometry::FINEST;
+    use crate::geometry::FINEST_LEVEL;
     use chaic_test_kit::scenes;
 
     #[test]
@@ -126,7 +126,7 @@ mod tests {
                 posture.impairments = IMPAIRMENTS.iter().filter(has).map(|i| i.id).collect();
                 posture.height_m = rng.range(1.0, 1.9);
                 let body = Body::new(&posture, rng.below(100) as u32);
-                let (mesh, max_margin) = (body.level(FINEST), 0.35);
+                let (mesh, max_margin) = (body.level(FINEST_LEVEL), 0.35);
                 assert!(body.min.cmple(mesh.min).all(), "{posture:?}: {} {}", body.min, mesh.min);
                 assert!(body.max.cmpge(mesh.max).all(), "{posture:?}: {} {}", body.max, mesh.max);
                 let slack = (mesh.min - body.min).max(body.max - mesh.max).max_element();

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use chaic_world::{Posture, State};
 
 use crate::Scene;
-use crate::geometry::{FINEST, InstanceData, MeshData};
+use crate::geometry::{FINEST_LEVEL, InstanceData, MeshData};
 use crate::lighting::Lighting;
 use crate::people::Body;
 use crate::scene_frame::{SceneFrame, Shape, ShapeKey};
@@ -29,7 +29,7 @@ pub struct BodyShape(Body);
 impl BodyShape {
     /// Returns the mesh at a level of detail; levels past the finest give the finest.
     pub fn mesh(&self, level: usize) -> MeshData {
-        MeshData::from(self.0.level(level.min(FINEST)))
+        MeshData::from(self.0.level(level.min(FINEST_LEVEL)))
     }
 }
 
@@ -75,7 +75,7 @@ impl Shapes<'_> {
     /// # Panics
     /// If `index` is out of range.
     pub fn mesh(&self, index: usize, level: usize) -> MeshData {
-        MeshData::from(self.shapes[index].mesh(level.min(FINEST)))
+        MeshData::from(self.shapes[index].mesh(level.min(FINEST_LEVEL)))
     }
 
     /// Returns the lighting of the frame.

@@ -64,7 +64,7 @@ const _: () = assert!(
         + (Setup::MAX_ROOMS + Setup::MAX_CEILING_PIECES)
         + Setup::MAX_ROOMS
         + AgentId::MAX_AGENTS
-        + Setup::MAX_THINGS
+        + Setup::MAX_OBJECTS
         < 0xffff
 );
 

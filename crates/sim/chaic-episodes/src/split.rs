@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use chaic_core::TaskId;
 use chaic_core::capability::UnknownPersonChange;
-use chaic_core::task::Origin;
+use chaic_core::task::TaskOrigin;
 
 use crate::Settings;
 use crate::attempts::GenerateError;
@@ -139,7 +139,7 @@ impl FromStr for Split {
 impl Split {
     /// Returns the number of episodes of a task. Fixed splits contain the paper's tasks only.
     pub fn len_of(&self, task: TaskId) -> usize {
-        let is_in_paper = task.info().origin != Origin::Chaic;
+        let is_in_paper = task.info().origin != TaskOrigin::Chaic;
         match self {
             Split::Train | Split::Test | Split::Standard if !is_in_paper => 0,
             Split::Train | Split::Test => BUNDLED_PER_TASK,

@@ -54,7 +54,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// Returns the path lengths from all reachable furniture that can hold objects, meters.
 fn path_lengths_to_bed(setup: &Setup) -> Vec<f32> {
-    let Some(bed) = setup.goal_places.first().and_then(|e| setup.thing_index(*e)) else {
+    let Some(bed) = setup.goal_places.first().and_then(|e| setup.object_index(*e)) else {
         return Vec::new();
     };
     let radius_m = Persona::Adult.capability().radius_m;

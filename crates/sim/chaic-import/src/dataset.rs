@@ -16,19 +16,19 @@ const MAX_EPISODES: usize = 1000;
 
 /// Training or test part of the data set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Half {
+pub enum SourceSplit {
     /// Floor plans 1 and 4.
     Train,
     /// Floor plans 2 and 5.
     Test,
 }
 
-impl Half {
+impl SourceSplit {
     /// Returns the name in ids and files.
     pub fn name(self) -> &'static str {
         match self {
-            Half::Train => "train",
-            Half::Test => "test",
+            SourceSplit::Train => "train",
+            SourceSplit::Test => "test",
         }
     }
 
@@ -267,8 +267,8 @@ fn objects(commands: Vec<Command>, path: &Path) -> Result<Vec<Object>, ImportErr
                     let problem = format!("is {id}, which is the id of another object");
                     return Err(ImportError::field(path, field, problem));
                 }
-                if objects.len() == Setup::MAX_THINGS {
-                    let problem = format!("adds more than {} objects", Setup::MAX_THINGS);
+                if objects.len() == Setup::MAX_OBJECTS {
+                    let problem = format!("adds more than {} objects", Setup::MAX_OBJECTS);
                     return Err(ImportError::field(path, field, problem));
                 }
                 objects.push(Object { id, model: name, position, euler_deg, scale });

@@ -35,7 +35,7 @@ use chaic_world::Setup;
 use crate::dataset::{Source, TaskFolder};
 use crate::package::Package;
 
-pub use dataset::Half;
+pub use dataset::SourceSplit;
 pub use error::ImportError;
 
 /// Sources of an import.
@@ -46,7 +46,7 @@ pub struct Sources {
     /// Folder of the `tdw` package, or the folder that contains it.
     pub tdw: PathBuf,
     /// Half to import; `None` imports every half that exists.
-    pub half: Option<Half>,
+    pub half: Option<SourceSplit>,
 }
 
 /// Result of an import.
@@ -115,10 +115,11 @@ pub fn house(sources: &Sources, scene: &str, layout: usize) -> Result<Setup, Imp
 }
 
 /// Returns the halves to import, with their folders.
-fn halves(sources: &Sources) -> Result<Vec<(Half, PathBuf)>, ImportError> {
+fn halves(sources: &Sources) -> Result<Vec<(SourceSplit, PathBuf)>, ImportError> {
     let dataset = &sources.dataset;
-    let requested: Vec<Half> = sources.half.map_or(vec![Half::Train, Half::Test], |h| vec![h]);
-    let found: Vec<(Half, PathBuf)> =
+    let requested: Vec<SourceSplit> =
+        sources.half.map_or(vec![SourceSplit::Train, SourceSplit::Test], |h| vec![h]);
+    let found: Vec<(SourceSplit, PathBuf)> =
         requested.iter().filter_map(|h| Some((*h, h.folder(dataset)?))).collect();
     if found.is_empty() {
         let names: Vec<&str> = requested.iter().map(|h| h.name()).collect();
@@ -132,7 +133,7 @@ fn halves(sources: &Sources) -> Result<Vec<(Half, PathBuf)>, ImportError> {
 
 /// Imports the episodes of one task; returns a result for each.
 fn task_episodes(
-    half: Half,
+    half: SourceSplit,
     folder: &Path,
     task: TaskId,
     package: &Package,
@@ -153,7 +154,7 @@ fn task_episodes(
 }
 
 /// Wraps a setup in an episode.
-fn to_episode(half: Half, source: &Source, setup: Setup) -> Result<Episode, ImportError> {
+fn to_episode(half: SourceSplit, source: &Source, setup: Setup) -> Result<Episode, ImportError> {
     let split = format!("original-{}", half.name());
     let id = format!("{}/{split}/{:02}", source.task, source.index);
     let path = source.commands_path.clone();

@@ -86,8 +86,8 @@ impl Package {
         let found = self.layouts.get(floorplan).and_then(|l| l.get(layout)).ok_or_else(|| {
             field(format!("is missing: there is no layout {layout} of floor plan {floorplan}"))
         })?;
-        if found.len() > Setup::MAX_THINGS {
-            return Err(field(format!("has more than {} pieces", Setup::MAX_THINGS)));
+        if found.len() > Setup::MAX_OBJECTS {
+            return Err(field(format!("has more than {} pieces", Setup::MAX_OBJECTS)));
         }
         Ok(found)
     }

@@ -13,7 +13,7 @@ use chaic_core::geom::{horizontal_distance, to_xz, wrap_angle};
 use chaic_core::{Action, AgentId, EntityId, ResolvedAction, Vec3};
 
 use crate::event::EventKind;
-use crate::rules::{JointLift, ReachTo};
+use crate::rules::{JointLift, ReachReference};
 use crate::state::{ActionStep, Activity, ObjectLocation, Phase};
 use crate::world::World;
 
@@ -82,7 +82,7 @@ impl World {
                 };
                 let mut steps = vec![ActionStep::new(Phase::DecidePickUp { hand, object }, 0)];
                 if is_heavy {
-                    steps.push(ActionStep::new(Phase::AwaitPartner { object, absent: 0 }, 0));
+                    steps.push(ActionStep::new(Phase::WaitForOtherAgent { object, absent: 0 }, 0));
                 }
                 let docking = self.capability(agent).docking_frames;
                 if docking > 0 && self.vehicle(agent).is_some() {
@@ -167,7 +167,7 @@ impl World {
             let from = self.person(a).pose.position;
             let is_visible = |to| !self.wall_between(from, to);
             horizontal_distance(from, state.position) <= limit_m
-                && (self.rules.reach_to == ReachTo::Middle
+                && (self.rules.reach_to == ReachReference::Middle
                     || is_visible(state.position)
                     || is_visible(self.nearest_point(from, entity)))
         };
@@ -182,7 +182,7 @@ impl World {
         if self.reach_distance(agent, entity) > limit_m {
             return Err(FailureReason::Blocked);
         }
-        if self.rules.reach_to == ReachTo::Middle {
+        if self.rules.reach_to == ReachReference::Middle {
             return Ok(());
         }
         let from = self.person(agent).pose.position;

@@ -40,14 +40,14 @@ mod world;
 
 pub use event::{Event, EventKind};
 pub use posture::{Arm, Posture};
-pub use rules::{Blocking, Durations, JointLift, ReachTo, Rules};
+pub use rules::{CollisionResponse, Durations, JointLift, ReachReference, Rules};
 pub use setup::{
     AgentSpec, Floor, FloorMaterial, ObjectSpec, Opening, Room, RoomKind, Setup, SetupError, Wall,
 };
 pub use shape::{Block, Surface, blocks_of, non_colliding_blocks, top_surfaces};
 pub use state::{
-    ActionStep, Activity, AgentState, DrawCounts, JointCarry, LastProgress, ObjectLocation,
-    ObjectState, PROGRESS_M, Phase, STUCK_AFTER_FRAMES, State,
+    ActionStep, Activity, AgentState, JointCarry, LastProgress, ObjectLocation, ObjectState,
+    PROGRESS_M, Phase, RandomDrawCounts, STUCK_AFTER_FRAMES, State,
 };
 pub use view::episode_stream;
 pub use world::{Snapshot, SnapshotError, SubmitError, World};

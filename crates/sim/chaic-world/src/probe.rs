@@ -1,7 +1,7 @@
-//! Collision probe of [`Blocking::Creeps`]: a flat box ahead of the walker is tested in every frame
-//! (facts S1.5 and S3.3).
+//! Collision probe of [`CollisionResponse::Creeps`]: a flat box ahead of the walker is tested in
+//! every frame (facts S1.5 and S3.3).
 //!
-//! [`Blocking::Creeps`]: crate::Blocking::Creeps
+//! [`CollisionResponse::Creeps`]: crate::CollisionResponse::Creeps
 
 use chaic_core::capability::Persona;
 use chaic_core::catalogue::Role;
@@ -68,7 +68,7 @@ impl World {
     /// Returns whether an object is tested. Furniture is not, and in the street neither are stalls
     /// and goal places.
     fn is_tested(&self, entity: EntityId) -> bool {
-        let Some(index) = self.setup.thing_index(entity) else { return true };
+        let Some(index) = self.setup.object_index(entity) else { return true };
         let info = self.setup.things[index].class.info();
         let is_outdoors = self.setup.task.info().scene != SceneKind::House;
         let is_exempt =

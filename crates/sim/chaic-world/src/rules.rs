@@ -2,7 +2,7 @@
 //! never adds an `if` elsewhere. `docs/rules.md` lists every field with its source.
 
 use chaic_core::TaskId;
-use chaic_core::briefing::Motion;
+use chaic_core::briefing::MotionParams;
 use chaic_core::capability::LimitPenalty;
 use chaic_core::task::GoalTop;
 use serde::{Deserialize, Serialize};
@@ -55,7 +55,7 @@ pub struct Durations {
 /// Behavior of an agent that walks into something.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Blocking {
+pub enum CollisionResponse {
     /// Bodies are solid: the agent stops, or slides along.
     Stops,
     /// Nothing blocks an agent permanently. A step that touches something ends successfully after
@@ -67,7 +67,7 @@ pub enum Blocking {
 /// Reference point for reaching an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum ReachTo {
+pub enum ReachReference {
     /// Its nearest point; no wall may be in between.
     NearestPoint,
     /// Its center; walls are ignored, and a put-on requires no distance (facts S3.5 and S3.7).
@@ -97,7 +97,7 @@ pub struct Rules {
     /// A step that covered less than this distance fails, meters: an eighth of a step.
     pub min_progress_m: f32,
     /// Behavior of an agent that walks into something.
-    pub blocking: Blocking,
+    pub blocking: CollisionResponse,
     /// Agents step over objects below this height, meters (facts S1.5: probe from 0.12 m).
     pub step_over_m: f32,
     /// Maximum distance from which an agent approaches an object, meters. It is measured from the
@@ -113,7 +113,7 @@ pub struct Rules {
     /// The same limit for furniture that is being moved (facts S9.3: 3 m).
     pub furniture_reach_limit_m: f32,
     /// Reference point for reaching.
-    pub reach_to: ReachTo,
+    pub reach_to: ReachReference,
     /// Condition for a joint lift of furniture.
     pub joint_lift: JointLift,
     /// True if all agents are informed at once about removed obstacles (facts S5.5).
@@ -169,9 +169,9 @@ impl Rules {
     }
 
     /// Returns the motion parameters for the briefing.
-    pub fn motion(&self) -> Motion {
+    pub fn motion(&self) -> MotionParams {
         let Rules { turn_rad, stride_m, step_over_m, arm_reach_m, reach_limit_m, .. } = *self;
-        Motion { turn_rad, stride_m, step_over_m, arm_reach_m, reach_limit_m }
+        MotionParams { turn_rad, stride_m, step_over_m, arm_reach_m, reach_limit_m }
     }
 
     /// Returns the rules of the paper, with measured values of the original where the paper has
@@ -198,13 +198,13 @@ impl Rules {
             stride_m: 0.4,
             turn_rad: std::f32::consts::PI / 12.0,
             min_progress_m: 0.05,
-            blocking: Blocking::Stops,
+            blocking: CollisionResponse::Stops,
             step_over_m: 0.12,
             approach_limit_m: 3.0,
             arm_reach_m: 0.7,
             reach_limit_m: 2.0,
             furniture_reach_limit_m: 2.0,
-            reach_to: ReachTo::NearestPoint,
+            reach_to: ReachReference::NearestPoint,
             joint_lift: JointLift::BothAtIt,
             announces_removed_obstacles: false,
             pick_penalty: LimitPenalty::PICK,
@@ -240,9 +240,9 @@ impl Rules {
                 failed_grasp: 0,
                 ..paper.durations
             },
-            blocking: Blocking::Creeps,
+            blocking: CollisionResponse::Creeps,
             furniture_reach_limit_m: 3.0,
-            reach_to: ReachTo::Middle,
+            reach_to: ReachReference::Middle,
             joint_lift: JointLift::LastChoice,
             announces_removed_obstacles: true,
             failed_put_on_can_deliver: true,

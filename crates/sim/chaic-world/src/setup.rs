@@ -288,7 +288,7 @@ fn check_optional_limits(i: usize, c: &Capability) -> Result<(), SetupError> {
 
 impl Setup {
     /// Maximum number of objects in one episode. Ids must fit in 16 bits, and memory stays bounded.
-    pub const MAX_THINGS: usize = 4096;
+    pub const MAX_OBJECTS: usize = 4096;
     /// Maximum side length of the bounds, meters. Maps cover the whole area.
     pub const MAX_LENGTH_M: f32 = 200.0;
     /// Maximum number of walls in one episode.
@@ -308,12 +308,12 @@ impl Setup {
     pub const MAX_COORDINATE_M: f32 = 1000.0;
 
     /// Returns the object with this id.
-    pub fn thing(&self, entity: EntityId) -> Option<&ObjectSpec> {
-        self.thing_index(entity).map(|i| &self.things[i])
+    pub fn object(&self, entity: EntityId) -> Option<&ObjectSpec> {
+        self.object_index(entity).map(|i| &self.things[i])
     }
 
     /// Returns the index of an object in [`Setup::things`].
-    pub fn thing_index(&self, entity: EntityId) -> Option<usize> {
+    pub fn object_index(&self, entity: EntityId) -> Option<usize> {
         let i = usize::from(entity.0.checked_sub(EntityId::FIRST_OBJECT.0)?);
         (i < self.things.len()).then_some(i)
     }
@@ -363,8 +363,8 @@ impl Setup {
             ("walls", self.walls.len(), Setup::MAX_WALLS),
             ("openings", self.openings.len(), Setup::MAX_OPENINGS),
             ("floors", self.floors.len(), Setup::MAX_FLOORS),
-            ("things", self.things.len(), Setup::MAX_THINGS),
-            ("goal_places", self.goal_places.len(), Setup::MAX_THINGS),
+            ("things", self.things.len(), Setup::MAX_OBJECTS),
+            ("goal_places", self.goal_places.len(), Setup::MAX_OBJECTS),
         ] {
             if n > max {
                 return Err(SetupError::new(field, format!("has {n} entries, at most {max}")));
@@ -464,9 +464,9 @@ impl Setup {
             return Err(SetupError::new("goal.targets", "is empty, expected at least one class"));
         }
         for (i, (class, n)) in self.goal.targets.iter().enumerate() {
-            if *n == 0 || *n as usize > Setup::MAX_THINGS {
+            if *n == 0 || *n as usize > Setup::MAX_OBJECTS {
                 let problem =
-                    format!("asks for {n} of {class}, expected 1 to {}", Setup::MAX_THINGS);
+                    format!("asks for {n} of {class}, expected 1 to {}", Setup::MAX_OBJECTS);
                 return Err(SetupError::new(format!("goal.targets[{i}]"), problem));
             }
             if self.goal.targets[..i].iter().any(|(c, _)| c == class) {
@@ -481,7 +481,7 @@ impl Setup {
         }
         for (i, entity) in self.goal_places.iter().enumerate() {
             let last = Setup::entity(self.things.len().saturating_sub(1));
-            match self.thing(*entity) {
+            match self.object(*entity) {
                 None => {
                     let problem = format!(
                         "is {}, expected the id of an object: {} (things[0]) to {}",
@@ -492,7 +492,7 @@ impl Setup {
                     return Err(SetupError::new(format!("goal_places[{i}]"), problem));
                 }
                 Some(t) if !t.fixed => {
-                    let k = self.thing_index(*entity).unwrap_or_default();
+                    let k = self.object_index(*entity).unwrap_or_default();
                     let problem = format!("names things[{k}] ({}), which is not fixed", t.class);
                     return Err(SetupError::new(format!("goal_places[{i}]"), problem));
                 }

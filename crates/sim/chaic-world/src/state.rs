@@ -44,7 +44,7 @@ pub struct ImpairmentState {
 
 /// Number of draws of each purpose for an agent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct DrawCounts {
+pub struct RandomDrawCounts {
     /// Draws of whether a fragile object breaks.
     pub breaks: u32,
     /// Draws of whether a pick-up succeeds.
@@ -125,7 +125,7 @@ pub struct AgentState {
     /// Total distance walked, meters; the animation of legs and wheels depends on it.
     pub walked_m: f32,
     /// Number of random draws per purpose.
-    pub draws: DrawCounts,
+    pub draws: RandomDrawCounts,
     /// Last progress of the agent.
     pub progress: LastProgress,
 }
@@ -164,7 +164,7 @@ impl AgentState {
             last_interaction: None,
             in_stride: false,
             walked_m: 0.0,
-            draws: DrawCounts::default(),
+            draws: RandomDrawCounts::default(),
             progress: LastProgress { frame: 0, position: pose.position, is_stuck: false },
         }
     }
@@ -244,7 +244,7 @@ pub enum Phase {
         object: EntityId,
     },
     /// Stands at furniture until the other agent stands at it too.
-    AwaitPartner {
+    WaitForOtherAgent {
         /// The furniture.
         object: EntityId,
         /// Number of consecutive frames in which no other agent tried to take it.

@@ -13,7 +13,7 @@ use chaic_core::{Action, AgentId, EntityId, Hand, Outcome, Vec2, Vec3};
 
 use crate::event::EventKind;
 use crate::random::RngPurpose;
-use crate::rules::Blocking;
+use crate::rules::CollisionResponse;
 use crate::state::{ActionStep, Activity, ObjectLocation, PROGRESS_M, Phase, STUCK_AFTER_FRAMES};
 use crate::world::World;
 
@@ -129,7 +129,7 @@ impl World {
                 self.face(agent, to);
                 status
             }
-            Phase::AwaitPartner { .. } => self.await_partner(agent, activity),
+            Phase::WaitForOtherAgent { .. } => self.wait_for_other_agent(agent, activity),
             Phase::DecidePickUp { hand, object } => {
                 self.decide_pick_up(agent, activity, hand, object)
             }
@@ -169,7 +169,7 @@ impl World {
         let moved = self.step_towards(agent, direction, speed);
         *remaining_m -= speed;
         *covered_m += moved;
-        if self.rules.blocking == Blocking::Creeps {
+        if self.rules.blocking == CollisionResponse::Creeps {
             let is_done = *remaining_m <= 0.0 || self.touches_something(agent);
             return if is_done { StepProgress::Done } else { StepProgress::Running };
         }
@@ -201,7 +201,7 @@ impl World {
         let speed =
             self.capability(agent).approach_speed_m_per_frame * self.remaining_strength(agent);
         self.step_towards(agent, forward(yaw), speed);
-        if self.rules.blocking == Blocking::Creeps && self.touches_something(agent) {
+        if self.rules.blocking == CollisionResponse::Creeps && self.touches_something(agent) {
             return StepProgress::Done;
         }
         let approached_m = before - self.reach_distance(agent, entity);
@@ -239,7 +239,7 @@ impl World {
         to: Vec3,
     ) -> Vec3 {
         let xz = |v: Vec3| Vec2::new(v.x, v.z);
-        if self.rules.blocking == Blocking::Creeps {
+        if self.rules.blocking == CollisionResponse::Creeps {
             let p = xz(to).clamp(self.setup.bounds.min, self.setup.bounds.max);
             return Vec3::new(p.x, from.y, p.y);
         }

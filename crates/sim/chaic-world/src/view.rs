@@ -7,7 +7,7 @@ use chaic_core::capability::{Eyesight, Gait};
 use chaic_core::catalogue::{CLASSES, Role};
 use chaic_core::geom::{Camera, pitch_rotation, rotate_yaw, yaw_rotation};
 use chaic_core::observation::{
-    Granted, Grants, Held, HeldIdentity, JointCarrier, ObservedAction, Proprioception,
+    GrantedInfo, Grants, HeldIdentity, HeldObject, JointCarrier, ObservedAction, Proprioception,
 };
 use chaic_core::rng::RngStream;
 use chaic_core::task::SceneKind;
@@ -88,7 +88,7 @@ impl World {
     ) -> Proprioception {
         let in_both_hands = self.holds_furniture(agent).is_some();
         let hands = self.person(agent).hands.map(|held| {
-            held.map(|entity| Held {
+            held.map(|entity| HeldObject {
                 n_contents: self.contents(entity).len() as u32,
                 in_both_hands,
                 identity: grants.ids.then(|| self.identity(entity)),
@@ -108,8 +108,8 @@ impl World {
     /// Returns the granted information of an agent for this frame, in addition to images and
     /// proprioception. `in_view` holds the entities in the agent's image in the order of ids,
     /// without walls and floor.
-    pub fn granted(&self, agent: AgentId, grants: Grants, in_view: &[EntityId]) -> Granted {
-        let mut granted = Granted::default();
+    pub fn granted(&self, agent: AgentId, grants: Grants, in_view: &[EntityId]) -> GrantedInfo {
+        let mut granted = GrantedInfo::default();
         let is_in_view = |entity: EntityId| in_view.binary_search(&entity).is_ok();
         if grants.ids {
             let class = |e: &EntityId| Some((*e, self.class_of(*e)?));
@@ -147,7 +147,7 @@ impl World {
     fn class_of(&self, entity: EntityId) -> Option<ClassId> {
         let is_person = || entity.agent().is_some_and(|a| a.index() < self.setup.people.len());
         let person = || is_person().then(|| ClassId::named("person"));
-        self.setup.thing(entity).map(|t| t.class).or_else(person)
+        self.setup.object(entity).map(|t| t.class).or_else(person)
     }
 
     /// Returns the class of every entity, indexed by id; constant during an episode. For rendering
@@ -325,7 +325,7 @@ impl World {
 
     /// Returns whether an object is still in the scene.
     pub fn is_visible(&self, entity: EntityId) -> bool {
-        self.setup.thing_index(entity).is_some()
+        self.setup.object_index(entity).is_some()
             && self.object(entity).1.location != ObjectLocation::Broken
     }
 }

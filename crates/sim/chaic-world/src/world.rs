@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::collide::{BlockIndex, Body, Disc};
 use crate::event::{Event, EventKind};
-use crate::rules::{ReachTo, Rules};
+use crate::rules::{ReachReference, Rules};
 use crate::setup::{AgentSpec, ObjectSpec, Setup, SetupError};
 use crate::shape::{Block, blocks_at, blocks_of, wall_blocks};
 use crate::state::{AgentState, ImpairmentState, ObjectLocation, ObjectState, State};
@@ -244,7 +244,7 @@ impl World {
     }
 
     fn index(&self, entity: EntityId) -> usize {
-        self.setup.thing_index(entity).expect("ids inside the world are those of its setup")
+        self.setup.object_index(entity).expect("ids inside the world are those of its setup")
     }
 
     pub(crate) fn record_event(&mut self, kind: EventKind) {
@@ -322,8 +322,8 @@ impl World {
                 && self.setup.task.info().goal_approach == GoalApproach::NearestPoint
         };
         match self.rules.reach_to {
-            ReachTo::Middle if !is_reached_at_edge() => self.object(entity).1.position,
-            ReachTo::Middle | ReachTo::NearestPoint => self.nearest_point(p, entity),
+            ReachReference::Middle if !is_reached_at_edge() => self.object(entity).1.position,
+            ReachReference::Middle | ReachReference::NearestPoint => self.nearest_point(p, entity),
         }
     }
 

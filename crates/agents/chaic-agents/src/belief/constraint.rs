@@ -5,7 +5,7 @@ use chaic_core::capability::{Capability, LimitPenalty, PersonKind, Persona, exce
 use chaic_core::geom::math;
 use chaic_core::task::{Arrangement, TaskInfo};
 
-use super::evidence::{AttemptKind, Evidence, FailedAttempt, Take, reliability};
+use super::evidence::{AttemptKind, Evidence, FailedAttempt, PickUpEvidence, reliability};
 use super::scene::{paper_tasks, scene_of};
 use super::{normalized, posterior};
 
@@ -164,7 +164,7 @@ fn take_chance(capability: &Capability, top_m: f32, mass_kg: f32) -> f32 {
 }
 
 /// Returns the likelihood of a take. A take that is not real is equally likely for all people.
-fn take_likelihood(capability: &Capability, take: &Take) -> f32 {
+fn take_likelihood(capability: &Capability, take: &PickUpEvidence) -> f32 {
     let Some(top_m) = take.top_m else { return 1.0 };
     let real = take.reliability();
     real * take_chance(capability, top_m, take.class.info().mass_kg) + (1.0 - real)

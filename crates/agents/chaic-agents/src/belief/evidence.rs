@@ -51,7 +51,7 @@ const CONFIRMED_M: f32 = 0.1;
 
 /// Evidence that the partner has taken an object.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Take {
+pub struct PickUpEvidence {
     /// Class of the object.
     pub class: ClassId,
     /// Strength of the evidence, above 0 and at most 1 (certain).
@@ -62,7 +62,7 @@ pub struct Take {
     pub top_m: Option<f32>,
 }
 
-impl Take {
+impl PickUpEvidence {
     /// Returns the probability that the take is real.
     pub fn reliability(&self) -> f32 {
         reliability(self.strength)
@@ -114,7 +114,7 @@ pub struct FailedAttempt {
 #[derive(Clone, Debug, Default)]
 pub struct Evidence {
     /// Possible targets that the partner has taken. The agent's own pick-ups never count.
-    pub taken: BTreeMap<TrackId, Take>,
+    pub taken: BTreeMap<TrackId, PickUpEvidence>,
     /// Attempts that failed at the partner's limits, in the order of observation.
     pub failed: Vec<FailedAttempt>,
     /// Possible targets that the partner was near, and left lying with a free hand.
@@ -239,9 +239,14 @@ impl Evidence {
         self.passed.remove(&track);
         self.visits.remove(&track);
         let top_m = self.lying_top_m(track);
-        let take = self.taken.entry(track).or_insert(Take { class, strength: 0.0, frame, top_m });
+        let take = self.taken.entry(track).or_insert(PickUpEvidence {
+            class,
+            strength: 0.0,
+            frame,
+            top_m,
+        });
         if strength > take.strength {
-            *take = Take { class, strength, frame, top_m };
+            *take = PickUpEvidence { class, strength, frame, top_m };
         }
     }
 

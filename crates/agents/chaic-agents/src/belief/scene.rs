@@ -1,7 +1,7 @@
 //! Public knowledge about scenes: their target sets and the sizes of these sets.
 
 use chaic_core::catalogue::TargetSet;
-use chaic_core::task::{Origin, SceneKind, TASKS, TaskInfo};
+use chaic_core::task::{SceneKind, TASKS, TaskInfo, TaskOrigin};
 use chaic_core::{ClassId, Role};
 
 /// Returns the kind of scene with these possible targets; `None` if none of them belongs to a
@@ -25,7 +25,7 @@ pub fn scene_of(possible_targets: &[ClassId]) -> Option<SceneKind> {
 /// Returns the tasks of the paper in this kind of scene, or all of them.
 pub fn paper_tasks(scene: Option<SceneKind>) -> impl Iterator<Item = &'static TaskInfo> {
     let is_here = move |t: &&TaskInfo| scene.is_none_or(|s| t.scene == s);
-    TASKS.iter().filter(|t| t.origin != Origin::Chaic).filter(is_here)
+    TASKS.iter().filter(|t| t.origin != TaskOrigin::Chaic).filter(is_here)
 }
 
 /// Returns the target sets of a kind of scene, in their order.

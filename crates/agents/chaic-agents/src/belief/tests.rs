@@ -39,8 +39,8 @@ pub fn evidence_with(set: impl FnOnce(&mut Evidence)) -> Evidence {
 }
 
 /// Creates a take of an object whose former place is unknown.
-pub fn taken(class: &str, strength: f32) -> Take {
-    Take { class: ClassId::named(class), strength, frame: 10, top_m: None }
+pub fn taken(class: &str, strength: f32) -> PickUpEvidence {
+    PickUpEvidence { class: ClassId::named(class), strength, frame: 10, top_m: None }
 }
 
 /// Creates a failed pick-up that is certain.

@@ -37,7 +37,7 @@ struct Goal<'a> {
 impl SearchGoal for Goal<'_> {
     fn is_goal(&self, cell: usize) -> bool {
         self.min_distance_m(cell) <= 0.0
-            && !self.costs.is_tight(cell)
+            && !self.costs.touches_obstacle(cell)
             && self.destination.accepts(self.costs, self.costs.grid().center(cell), 0.0)
     }
 
@@ -130,7 +130,7 @@ impl CarefulNavigator {
             .min_by(|a, b| a.1.total_cmp(&b.1));
         let Some((i, off_m)) = nearest else { return false };
         let is_blocked =
-            |c: &usize| costs.is_blocked(*c) || (costs.is_tight(*c) && !self.is_tight_path);
+            |c: &usize| costs.is_blocked(*c) || (costs.touches_obstacle(*c) && !self.is_tight_path);
         if off_m > OFF_PATH_M || ahead[i..].iter().any(is_blocked) {
             return false;
         }
@@ -150,7 +150,7 @@ impl CarefulNavigator {
         let Some(start) = costs.grid().cell_at(here) else { return false };
         match search.a_star(costs.grid(), costs.costs(), start, &goal, LIMIT) {
             Some(path) => {
-                self.is_tight_path = path.cells[1..].iter().any(|c| costs.is_tight(*c));
+                self.is_tight_path = path.cells[1..].iter().any(|c| costs.touches_obstacle(*c));
                 self.path = path.cells;
                 true
             }

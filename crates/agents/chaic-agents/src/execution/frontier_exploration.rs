@@ -156,7 +156,7 @@ impl FrontierExplorer {
     fn is_frontier(&self, memory: &Memory, cell: usize) -> bool {
         let (map, costs) = (&memory.map, memory.costs());
         map.state(cell) == CellOccupancy::Free
-            && !costs.is_tight(cell)
+            && !costs.touches_obstacle(cell)
             && self.unknown_side(memory, cell).is_some()
     }
 
@@ -294,7 +294,7 @@ impl FrontierExplorer {
             let cell = j * grid.nx() + i;
             let at = grid.center(cell);
             let is_usable = memory.map.state(cell) == CellOccupancy::Free
-                && !memory.costs().is_tight(cell)
+                && !memory.costs().touches_obstacle(cell)
                 && self.bounds.contains(at)
                 && at.distance(to_xz(memory.pose.position)) > 1.5
                 && !self.is_blacklisted(at);

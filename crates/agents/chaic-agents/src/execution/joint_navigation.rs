@@ -6,7 +6,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap, VecDeque};
 use std::f32::consts::TAU;
 
-use chaic_core::briefing::Motion;
+use chaic_core::briefing::MotionParams;
 use chaic_core::geom::{Pose, Rect, to_xz, wrap_angle};
 use chaic_core::{Action, Vec2, Vec3};
 
@@ -43,7 +43,7 @@ const STEP_PARTS: u32 = 3;
 struct Carriers<'a> {
     costs: &'a CostMap,
     bounds: Rect,
-    motion: Motion,
+    motion: MotionParams,
     other_in_body: Vec3,
     /// Required clearance of leader and follower, meters: at most what they have at the start.
     required_m: [f32; 2],

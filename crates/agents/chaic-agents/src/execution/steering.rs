@@ -2,7 +2,7 @@
 
 use std::f32::consts::PI;
 
-use chaic_core::briefing::Motion;
+use chaic_core::briefing::MotionParams;
 use chaic_core::geom::{self, to_xz, wrap_angle};
 use chaic_core::{Action, Vec2, Vec3};
 
@@ -19,7 +19,7 @@ const WALK_RAD: f32 = 0.157;
 const STEP_PER_STRIDE: f32 = 1.05;
 
 /// Length of a step, meters.
-pub fn step_length_m(motion: &Motion) -> f32 {
+pub fn step_length_m(motion: &MotionParams) -> f32 {
     STEP_PER_STRIDE * motion.stride_m
 }
 
@@ -30,7 +30,7 @@ pub(super) fn steer(
     here: Vec2,
     yaw: f32,
     target: Vec2,
-    motion: &Motion,
+    motion: &MotionParams,
 ) -> Intent {
     let half_circle = (PI / motion.turn_rad).round() as i32;
     let bearing = yaw_between(here, target);

@@ -60,7 +60,7 @@ impl CollisionMemory {
     }
 
     /// Cells that a body of this radius, meters, cannot enter because of barriers.
-    pub fn barred_cells(&self, grid: &Grid, radius_m: f32) -> impl Iterator<Item = usize> {
+    pub fn blocked_cells(&self, grid: &Grid, radius_m: f32) -> impl Iterator<Item = usize> {
         self.barriers.iter().flat_map(move |b| grid.disc(b.at, radius_m))
     }
 }
@@ -75,7 +75,7 @@ mod tests {
     fn repeated_bumps_form_a_barrier_for_a_while() {
         let grid = Grid::new(&Rect::new([-3.0, -3.0], [3.0, 3.0]));
         let mut bumps = CollisionMemory::default();
-        let n_barred = |bumps: &CollisionMemory| bumps.barred_cells(&grid, 0.35).count();
+        let n_barred = |bumps: &CollisionMemory| bumps.blocked_cells(&grid, 0.35).count();
         for at in [[0.0, -1.0], [0.0, -2.0], [0.2, -1.0]] {
             bumps.record(at.into(), 0, 1000);
         }
@@ -96,6 +96,6 @@ mod tests {
         assert!(!bumps.clear_barriers());
         (0..BARRIER_BUMPS).for_each(|_| bumps.record(Vec2::ZERO, 0, 1000));
         assert!(bumps.clear_barriers());
-        assert_eq!(bumps.barred_cells(&grid, 0.35).count(), 0);
+        assert_eq!(bumps.blocked_cells(&grid, 0.35).count(), 0);
     }
 }

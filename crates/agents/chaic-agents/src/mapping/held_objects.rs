@@ -1,10 +1,10 @@
 //! Objects in the agent's own hands, inferred from its own actions.
 
 use chaic_core::capability::Gait;
-use chaic_core::observation::{Held, Proprioception};
+use chaic_core::observation::{HeldObject, Proprioception};
 use chaic_core::{Action, ClassId, Hand, Outcome};
 
-use crate::track::{Carried, Hands, Intent, TrackId};
+use crate::track::{CarriedObject, Hands, Intent, TrackId};
 
 /// Track of the vehicle that a rider holds from the start, whose entity id is not granted.
 const OWN_VEHICLE: TrackId = TrackId(u32::MAX);
@@ -24,13 +24,13 @@ pub fn infer_held_objects(
         _ => None,
     };
     let carried = |hand: Hand| {
-        let sensed: &Held = own.hands[hand.index()].as_ref()?;
+        let sensed: &HeldObject = own.hands[hand.index()].as_ref()?;
         let n_contents = sensed.n_contents;
         let Some(held) = before.hands[hand.index()].clone() else {
             let holds_bike = gait == Gait::WalkBike && hand == Hand::Left;
             let bike = || Some((OWN_VEHICLE, ClassId::from_name("bike")?));
             let object = if holds_bike { bike() } else { taken };
-            return Some(Carried { object, contents: Vec::new(), n_contents });
+            return Some(CarriedObject { object, contents: Vec::new(), n_contents });
         };
         let mut contents = held.contents;
         if n_contents > held.n_contents {
@@ -43,7 +43,7 @@ pub fn infer_held_objects(
             contents.extend(stowed);
         }
         contents.truncate(n_contents as usize);
-        Some(Carried { contents, n_contents, ..held })
+        Some(CarriedObject { contents, n_contents, ..held })
     };
     Hands {
         hands: Hand::BOTH.map(carried),
@@ -55,8 +55,8 @@ pub fn infer_held_objects(
 mod tests {
     use super::*;
 
-    fn sensed(n_contents: u32) -> Option<Held> {
-        Some(Held { n_contents, in_both_hands: false, identity: None })
+    fn sensed(n_contents: u32) -> Option<HeldObject> {
+        Some(HeldObject { n_contents, in_both_hands: false, identity: None })
     }
 
     /// Sequence of actions: the sensed hands after each action, and the expected knowledge.
@@ -66,7 +66,7 @@ mod tests {
         let name = |track| if track == basket { "wicker_basket" } else { "apple" };
         let class_of = |track| ClassId::from_name(name(track));
         let take = |object, hand| Action::PickUp { object, hand };
-        let steps: [(Intent, [Option<Held>; 2], &str); 6] = [
+        let steps: [(Intent, [Option<HeldObject>; 2], &str); 6] = [
             (take(basket, Hand::Left), [sensed(0), None], "#2[], -"),
             (take(apple, Hand::Right), [sensed(0), sensed(0)], "#2[], #1[]"),
             (Action::PutIn, [sensed(1), None], "#2[#1], -"),
@@ -84,7 +84,7 @@ mod tests {
             };
             let last = Some((action, Outcome::Success));
             hands = infer_held_objects(&hands, &own, last, Gait::Walk, class_of);
-            let text = |c: &Option<Carried>| match c {
+            let text = |c: &Option<CarriedObject>| match c {
                 None => "-".to_owned(),
                 Some(c) => {
                     let inside: Vec<String> =
@@ -106,7 +106,10 @@ mod tests {
             other_end: None,
         };
         let hands = infer_held_objects(&Hands::default(), &own, None, Gait::WalkBike, |_| None);
-        assert_eq!(hands.hands[0].as_ref().and_then(Carried::class), ClassId::from_name("bike"));
+        assert_eq!(
+            hands.hands[0].as_ref().and_then(CarriedObject::class),
+            ClassId::from_name("bike")
+        );
         let right = hands.hands[1].as_ref().expect("it is sensed");
         assert_eq!((right.object, right.n_contents), (None, 2));
     }

@@ -340,7 +340,7 @@ impl SemanticMap {
     /// only update [`MappedObject::last_seen`], which is 0 before the first sighting. An object
     /// held by another agent keeps its track and counts as held; one in a container that no agent
     /// holds is absent.
-    pub fn place(&mut self, state: &ObjectState, now: Frame) {
+    pub fn apply_granted_state(&mut self, state: &ObjectState, now: Frame) {
         let track = TrackId::from(state.entity);
         let is_new = !self.objects.contains_key(&track);
         let object =
@@ -476,7 +476,7 @@ impl SemanticMap {
 
     /// Marks the objects of these tracks as absent, because they probably do not exist. Absent targets
     /// would be evidence of a pick-up, so only [`SemanticMap::forget_missing`] decides on targets.
-    pub fn withdraw(&mut self, tracks: &[TrackId], possible_targets: &[ClassId]) {
+    pub fn retract(&mut self, tracks: &[TrackId], possible_targets: &[ClassId]) {
         for track in tracks {
             let object = self.objects.get(track);
             if object.is_some_and(|object| !possible_targets.contains(&object.class)) {

@@ -199,7 +199,7 @@ fn withdrawn_objects_are_forgotten_and_withdrawn_targets_are_not_taken() {
     let toy = Toy::room(8.0, 8.0);
     let briefing = toy.briefing();
     let mut memory = Memory::new(&briefing, PlannerRules::paper());
-    let [bed, basket, apple] = [0, 1, 2].map(|k| TrackId(TrackId::FIRST_OWN.0 + k));
+    let [bed, basket, apple] = [0, 1, 2].map(|k| TrackId(TrackId::FIRST_SELF_ASSIGNED.0 + k));
     // Behind the agent.
     let bed_seen = seen(bed, "bed", [2.0, 0.0, 2.0], 1.2, 0.5);
     let basket_seen = seen(basket, "wicker_basket", [0.0, 0.0, 2.0], 0.3, 0.3);
@@ -212,7 +212,7 @@ fn withdrawn_objects_are_forgotten_and_withdrawn_targets_are_not_taken() {
     let detections = vec![bed_seen, basket_seen, apple_seen];
     let detected = Percepts { detections, ..Percepts::default() };
     assert_eq!(present_after(&detected), [true; 3]);
-    let withdrawn = Percepts { withdrawn: vec![bed, basket, apple], ..Percepts::default() };
-    assert_eq!(present_after(&withdrawn), [false, false, true]);
+    let retracted = Percepts { retracted: vec![bed, basket, apple], ..Percepts::default() };
+    assert_eq!(present_after(&retracted), [false, false, true]);
     assert_eq!(present_after(&detected), [true; 3], "all are detected again");
 }

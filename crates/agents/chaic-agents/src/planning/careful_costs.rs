@@ -7,7 +7,7 @@ use chaic_core::Frame;
 use chaic_core::geom::to_xz;
 
 use super::cost_map::{
-    CostMap, FARTHEST, FARTHEST_CELLS, FREE, M_PER_UNIT, OCCUPIED, UNKNOWN_EXTRA, WALL,
+    CostMap, FARTHEST, FARTHEST_CELLS, FREE, M_PER_UNIT, OCCUPIED, UNKNOWN_CELL_COST, WALL,
     chamfer_transform,
 };
 use super::cost_model::{CostInputs, CostModel, MapChanges};
@@ -15,7 +15,7 @@ use crate::mapping::grid::Grid;
 use crate::mapping::occupancy::CellOccupancy;
 
 /// Cost of each [`CellOccupancy`] without obstacles nearby.
-const STATE_COSTS: [u32; 4] = [FREE, FREE + UNKNOWN_EXTRA, OCCUPIED, WALL];
+const STATE_COSTS: [u32; 4] = [FREE, FREE + UNKNOWN_CELL_COST, OCCUPIED, WALL];
 /// States as bytes, which compare fast.
 const UNKNOWN_STATE: u8 = CellOccupancy::Unknown as u8;
 const OCCUPIED_STATE: u8 = CellOccupancy::Occupied as u8;
@@ -101,7 +101,7 @@ fn collect_states(costs: &CostMap, inputs: &CostInputs<'_>, states: &mut Vec<u8>
         }
     }
     let is_at_body = |cell: usize| grid.center(cell).distance(position) <= BODY_MARGIN_M;
-    for cell in map.bumps().barred_cells(grid, costs.radius_m).filter(|cell| !is_at_body(*cell)) {
+    for cell in map.bumps().blocked_cells(grid, costs.radius_m).filter(|cell| !is_at_body(*cell)) {
         states[cell] = states[cell].max(OCCUPIED_STATE);
     }
 }
@@ -224,7 +224,7 @@ mod tests {
     fn reference_costs(costs: &CostMap, inputs: &CostInputs<'_>) -> (Vec<u32>, Vec<u16>) {
         let (grid, radius_m) = (costs.grid(), costs.radius_m());
         let is_away = |p: Vec2| p.distance(inputs.position) > BODY_MARGIN_M;
-        let barred = inputs.map.bumps().barred_cells(grid, radius_m);
+        let barred = inputs.map.bumps().blocked_cells(grid, radius_m);
         let mut blocked: Vec<usize> = barred.filter(|cell| is_away(grid.center(*cell))).collect();
         for object in inputs.objects.iter().filter(|o| o.is_present && inputs.now >= o.held_until) {
             let points = object.footprint.iter().filter(|p| is_away(**p));
@@ -254,7 +254,7 @@ mod tests {
                 let beyond_m = f32::from(*units) * M_PER_UNIT - radius_m;
                 let ring = RINGS.iter().find(|(m, _)| beyond_m < *m);
                 let near = if beyond_m < 0.0 { TIGHT } else { ring.map_or(0, |(_, extra)| *extra) };
-                FREE + if is_unknown { UNKNOWN_EXTRA } else { 0 } + near
+                FREE + if is_unknown { UNKNOWN_CELL_COST } else { 0 } + near
             }
         };
         let mut cost: Vec<u32> = states.iter().zip(&clearance).map(place).collect();

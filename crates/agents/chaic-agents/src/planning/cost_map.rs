@@ -11,7 +11,7 @@ use crate::mapping::grid::{CELL_M, Grid};
 /// unknown, near something, occupied, wall.
 pub const FREE: u32 = 10;
 /// Extra cost of a cell whose floor was never seen (facts A1.5: 2.5 times a free cell).
-pub const UNKNOWN_EXTRA: u32 = 25;
+pub const UNKNOWN_CELL_COST: u32 = 25;
 /// Cost of an occupied cell.
 pub const OCCUPIED: u32 = 40_000;
 /// Cost of a cell with a wall.
@@ -58,7 +58,7 @@ impl CostMap {
         CostMap {
             grid,
             radius_m,
-            cost: vec![FREE + UNKNOWN_EXTRA; grid.n_cells()],
+            cost: vec![FREE + UNKNOWN_CELL_COST; grid.n_cells()],
             clearance: OnceCell::from(vec![FARTHEST; grid.n_cells()]),
             occupied: Vec::new(),
             basis: CostBasis::default(),
@@ -95,7 +95,7 @@ impl CostMap {
 
     /// Returns whether the body, centered in this cell, touches an obstacle.
     #[inline]
-    pub fn is_tight(&self, cell: usize) -> bool {
+    pub fn touches_obstacle(&self, cell: usize) -> bool {
         self.clearance_m(cell) < self.radius_m
     }
 
@@ -123,7 +123,7 @@ impl CostMap {
     /// Returns whether the body can move straight between two points without touching known
     /// obstacles.
     pub fn is_straight_clear(&self, from: Vec2, to: Vec2) -> bool {
-        self.grid.line(from, to).all(|cell| !self.is_tight(cell))
+        self.grid.line(from, to).all(|cell| !self.touches_obstacle(cell))
     }
 
     /// Returns whether the cell contains a wall.
@@ -208,11 +208,11 @@ mod tests {
             let row = format!("{}{}{}", "#".repeat(6), ".".repeat(n_free), "#".repeat(6));
             let plan = DrawnMap::parse(&[row.as_str(); 4].join("\n"));
             let costs = plan.costs(radius_m);
-            let through = (0..n_free).any(|i| !costs.is_tight(2 * (12 + n_free) + 6 + i));
+            let through = (0..n_free).any(|i| !costs.touches_obstacle(2 * (12 + n_free) + 6 + i));
             assert!(through, "{n_free} cells for {radius_m} m");
         }
         let plan = DrawnMap::parse(&["####....####"; 4].join("\n"));
         let costs = plan.costs(0.35);
-        assert!((0..4).all(|i| costs.is_tight(24 + 4 + i)), "half a meter is too narrow");
+        assert!((0..4).all(|i| costs.touches_obstacle(24 + 4 + i)), "half a meter is too narrow");
     }
 }

@@ -372,14 +372,14 @@ impl CostField {
 
 /// Goal that is a single cell.
 #[derive(Clone, Copy, Debug)]
-pub struct ToCell {
+pub struct CellGoal {
     /// Grid of the map.
     pub grid: Grid,
     /// The goal cell.
     pub cell: usize,
 }
 
-impl SearchGoal for ToCell {
+impl SearchGoal for CellGoal {
     fn is_goal(&self, cell: usize) -> bool {
         cell == self.cell
     }
@@ -427,7 +427,7 @@ mod tests {
                 .collect();
             let (start, end) = (rng.below(n), rng.below(n));
             let expected = reference_cost(&grid, &costs, start, end);
-            match search.a_star(&grid, &costs, start, &ToCell { grid, cell: end }, u32::MAX) {
+            match search.a_star(&grid, &costs, start, &CellGoal { grid, cell: end }, u32::MAX) {
                 Some(path) => {
                     assert_eq!(path.cost, expected, "seed {seed}");
                     assert_eq!((path.cells[0], *path.cells.last().unwrap()), (start, end));
@@ -456,7 +456,7 @@ mod tests {
             let costs: Vec<u32> = (0..n).map(|_| FREE + rng.below(3) as u32 / 2).collect();
             let (start, end) = (rng.below(n), rng.below(n));
             let expected = reference_cost(&grid, &costs, start, end);
-            let path = search.a_star(&grid, &costs, start, &ToCell { grid, cell: end }, u32::MAX);
+            let path = search.a_star(&grid, &costs, start, &CellGoal { grid, cell: end }, u32::MAX);
             assert_eq!(path.map(|p| p.cost), Some(expected), "seed {seed}");
         }
     }
@@ -474,7 +474,7 @@ mod tests {
         (costs[cell(1, 0)], costs[cell(40, 39)]) = (FREE, FREE);
         costs[cell(20, 20)] = FREE + 2;
         let end = cell(41, 39);
-        let goal = ToCell { grid, cell: end };
+        let goal = CellGoal { grid, cell: end };
         let path = Search::new(grid.n_cells()).a_star(&grid, &costs, 0, &goal, u32::MAX);
         let expected = FREE * (2 * STRAIGHT + 39 * DIAGONAL);
         assert_eq!(path.map(|p| p.cost), Some(expected));
@@ -495,8 +495,9 @@ mod tests {
         let mut search = Search::new(grid.n_cells());
         let field = CostField::new(&costs, grid.center(64), &mut search);
         let to = 64 + 9;
-        let path =
-            search.a_star(&grid, costs.costs(), 64, &ToCell { grid, cell: to }, u32::MAX).unwrap();
+        let path = search
+            .a_star(&grid, costs.costs(), 64, &CellGoal { grid, cell: to }, u32::MAX)
+            .unwrap();
         assert_eq!(field.cost(to), Some(path.cost));
         assert_eq!(field.cost(64 + 15), None);
     }

@@ -42,7 +42,7 @@ impl InferOptions {
     pub const ALL: InferOptions =
         InferOptions { follows_partner: true, infers_constraint: true, uses_team_planner: true };
     /// Without following the partner.
-    pub const NO_WATCHING: InferOptions =
+    pub const WITHOUT_FOLLOWING: InferOptions =
         InferOptions { follows_partner: false, ..InferOptions::ALL };
     /// Without inference of the partner's limits.
     pub const NO_CONSTRAINT: InferOptions =
@@ -78,7 +78,7 @@ mod constants {
     pub const ASSUMED_OBJECTS_PER_CLASS: f32 = 9.0;
     /// Value by which a new plan must exceed the current one before a walk to an object is given
     /// up, deliveries.
-    pub const SWITCH_GAIN: f32 = 0.25;
+    pub const MIN_SWITCH_GAIN: f32 = 0.25;
     /// Interval between reconsiderations of idle plans, frames.
     pub const IDLE_FRAMES: Frame = 60;
     /// Interval between reconsiderations of walks to objects, frames.
@@ -240,7 +240,7 @@ impl InferPolicy {
         let plan =
             search_operations(&problem, warm.as_slice(), SearchSettings::DEFAULT, &mut self.rng);
         let stay = warm.map_or(f32::MIN, |warm| simulate(&problem, &warm));
-        self.may_switch = plan.value > stay + SWITCH_GAIN;
+        self.may_switch = plan.value > stay + MIN_SWITCH_GAIN;
         self.partner_plan = description::expected_partner_plan(&problem, &plan.operations);
         self.steps = plan.operations.iter().map(|o| step(&problem, *o)).collect();
         self.first_valid(context, valid, &problem)

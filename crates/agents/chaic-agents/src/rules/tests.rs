@@ -15,7 +15,7 @@ use crate::memory::{ActionRecord, Memory};
 use crate::perception::{GroundTruthIds, Perception as _};
 use crate::policies::{RulePolicy, RuleProfile};
 use crate::test_support::{Toy, ToyObject, carried, hands};
-use crate::track::{Carried, TrackId};
+use crate::track::{CarriedObject, TrackId};
 use chaic_core::observation::Grants;
 use chaic_core::{Action, ClassId, FailureReason, Hand, Outcome};
 
@@ -29,7 +29,7 @@ fn subject(class: &str, track: u32) -> Subject {
 struct Scenario {
     memory: Memory,
     briefing: Briefing,
-    hands: [Option<Carried>; 2],
+    hands: [Option<CarriedObject>; 2],
     valid: Vec<Plan>,
 }
 

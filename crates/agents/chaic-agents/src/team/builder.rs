@@ -7,7 +7,7 @@ use chaic_core::geom::to_xz;
 use chaic_core::{Briefing, ClassId, Role, Vec2};
 
 use super::problem::{
-    GoalHypothesis, MAX_CLASSES, MAX_PLACES, NO_PATH_M, Place, PlaceKind, TeamProblem, Worker,
+    GoalHypothesis, MAX_CLASSES, MAX_PLACES, NO_PATH_M, Place, PlaceKind, TeamMember, TeamProblem,
 };
 use super::travel::{TravelCache, trace};
 use crate::mapping::MappedObject;
@@ -268,7 +268,7 @@ fn keep_nearest_containers(places: &mut Vec<Place>, from: Vec2) {
     }
 }
 
-fn helper_worker(briefing: &Briefing, memory: &Memory, classes: &[ClassId]) -> Worker {
+fn helper_worker(briefing: &Briefing, memory: &Memory, classes: &[ClassId]) -> TeamMember {
     let body = &briefing.capability;
     let index = |class: &ClassId| classes.iter().position(|c| c == class);
     let (mut loose, mut contained) = (Vec::new(), None);
@@ -282,7 +282,7 @@ fn helper_worker(briefing: &Briefing, memory: &Memory, classes: &[ClassId]) -> W
             _ => loose.push(index(&class).unwrap_or(MAX_CLASSES - 1)),
         }
     }
-    Worker {
+    TeamMember {
         speed_m_per_frame: MEAN_SPEED * body.speed_m_per_frame,
         docking_frames: 0.0,
         loose,
@@ -294,14 +294,14 @@ fn helper_worker(briefing: &Briefing, memory: &Memory, classes: &[ClassId]) -> W
     }
 }
 
-fn partner_worker(partner: &PartnerModel, classes: &[ClassId], capacity: usize) -> Worker {
+fn partner_worker(partner: &PartnerModel, classes: &[ClassId], capacity: usize) -> TeamMember {
     let body = &partner.capability;
     let is_rider = body.gait == Gait::WalkBike;
     let profile = if is_rider { RuleProfile::RIDER } else { RuleProfile::PARTNER };
     let index = |class: &ClassId| classes.iter().position(|c| c == class);
     let has_container = partner.holds.iter().any(|(_, c)| c.info().role == Role::Container);
     let carried: Vec<usize> = partner.holds.iter().filter_map(|(_, c)| index(c)).collect();
-    Worker {
+    TeamMember {
         speed_m_per_frame: MEAN_SPEED * body.speed_m_per_frame,
         docking_frames: body.docking_frames as f32,
         contained: has_container.then(|| carried.clone()),

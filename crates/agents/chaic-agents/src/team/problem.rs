@@ -48,7 +48,7 @@ pub struct Place {
 
 /// A person and what they carry.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Worker {
+pub struct TeamMember {
     /// Walking speed along a path, including turns and starts, meters per frame.
     pub speed_m_per_frame: f32,
     /// Time before each pick-up and put-on, frames: a rider docks the bicycle.
@@ -128,9 +128,9 @@ pub struct TeamProblem {
     /// Length of the whole episode, frames.
     pub horizon: f32,
     /// The helper.
-    pub helper: Worker,
+    pub helper: TeamMember,
     /// The partner; `None` plans for the helper alone.
-    pub partner: Option<Worker>,
+    pub partner: Option<TeamMember>,
     /// Maximum number of objects in a container.
     pub container_capacity: usize,
     /// Rules that the partner follows.

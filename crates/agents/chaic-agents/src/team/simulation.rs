@@ -4,7 +4,7 @@
 //! (paper section 5.1.1) on the places that it has probably seen.
 
 use super::problem::{
-    MAX_CLASSES, NO_PATH_M, Operation, OperationFrames, PlaceKind, TeamProblem, Worker,
+    MAX_CLASSES, NO_PATH_M, Operation, OperationFrames, PlaceKind, TeamMember, TeamProblem,
 };
 use crate::rules::RuleProfile;
 
@@ -118,7 +118,7 @@ struct Person {
 }
 
 impl Person {
-    fn new(worker: &Worker, row: usize) -> Person {
+    fn new(worker: &TeamMember, row: usize) -> Person {
         Person {
             time: 0.0,
             pending: None,
@@ -135,7 +135,7 @@ impl Person {
     }
 
     /// Number of further objects that fit.
-    fn n_free(&self, worker: &Worker, capacity: usize) -> usize {
+    fn n_free(&self, worker: &TeamMember, capacity: usize) -> usize {
         if self.has_container {
             capacity.saturating_sub(self.contained.n) + 1_usize.saturating_sub(self.loose.n)
         } else {
@@ -195,7 +195,7 @@ impl<'a> Simulation<'a> {
         self.value
     }
 
-    fn walk_frames(path_m: f32, worker: &Worker) -> f32 {
+    fn walk_frames(path_m: f32, worker: &TeamMember) -> f32 {
         path_m / worker.speed_m_per_frame.max(1e-3)
     }
 
@@ -261,7 +261,7 @@ impl<'a> Simulation<'a> {
     /// removed by then.
     fn arrive(
         &mut self,
-        worker: &Worker,
+        worker: &TeamMember,
         person: &mut Person,
         place: usize,
         is_helper: bool,
@@ -310,7 +310,7 @@ impl<'a> Simulation<'a> {
     /// more than one object.
     fn deliver(
         &mut self,
-        worker: &Worker,
+        worker: &TeamMember,
         person: &mut Person,
         by_helper: bool,
         on_event: &mut dyn FnMut(SimulatedEvent),
@@ -357,14 +357,14 @@ impl<'a> Simulation<'a> {
         person.is_done |= person.time >= problem.frames_left;
     }
 
-    fn is_blocked(&self, worker: &Worker, row: usize, place: usize) -> bool {
+    fn is_blocked(&self, worker: &TeamMember, row: usize, place: usize) -> bool {
         worker.is_blocked && self.problem.obstacles_on_path[row][place] & !self.removed != 0
     }
 
     /// One decision of the partner by the published rules.
     fn partner_step(
         &mut self,
-        worker: &Worker,
+        worker: &TeamMember,
         partner: &mut Person,
         helper: &Person,
         on_event: &mut dyn FnMut(SimulatedEvent),

@@ -3,13 +3,13 @@
 use chaic_core::rng::RngStream;
 use chaic_core::{ClassId, Vec2};
 
-use super::problem::{GoalHypothesis, Place, PlaceKind, TeamProblem, Worker};
+use super::problem::{GoalHypothesis, Place, PlaceKind, TeamMember, TeamProblem};
 use crate::rules::PlannerRules;
 use crate::track::TrackId;
 
 /// Creates a person with two hands who walks 0.1 m per frame.
-pub fn worker() -> Worker {
-    Worker {
+pub fn worker() -> TeamMember {
+    TeamMember {
         speed_m_per_frame: 0.1,
         docking_frames: 0.0,
         loose: Vec::new(),

@@ -104,7 +104,7 @@ fn cheapest(from: PathCosts<'_>, destination: &Destination) -> Option<Vec2> {
     let (center, radius_m) = destination.center_and_radius();
     let near = grid.disc(center, radius_m + destination.within_m);
     let mut cells: Vec<(u32, usize)> = near
-        .filter(|cell| !costs.is_tight(*cell))
+        .filter(|cell| !costs.touches_obstacle(*cell))
         .filter_map(|cell| Some((from.cost(cell)?, cell)))
         .collect();
     cells.sort_unstable();

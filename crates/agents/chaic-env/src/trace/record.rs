@@ -97,7 +97,7 @@ impl TraceEvent {
     /// Creates the record of an event in a world.
     pub fn new(event: Event, world: &World) -> TraceEvent {
         let class = match event.kind {
-            EventKind::Delivered { object, .. } => world.setup().thing(object).map(|t| t.class),
+            EventKind::Delivered { object, .. } => world.setup().object(object).map(|t| t.class),
             _ => None,
         };
         TraceEvent { event, class }

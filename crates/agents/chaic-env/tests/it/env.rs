@@ -271,7 +271,7 @@ fn deliveries_progress_and_failures_are_rewarded_per_action() {
     assert!((delivered + last - end.done / end.total).abs() < 1e-9, "{delivered} {last}");
     assert!(progress_m_total > 10.0, "{progress_m_total} m towards targets and goal");
     let terms = RewardTerms { delivered: 0.2, progress_m: 2.0, is_invalid: true };
-    let reward = terms.weigh(&RewardWeights::STANDARD);
+    let reward = terms.weighted_sum(&RewardWeights::STANDARD);
     assert!((reward - 2.0).abs() < 1e-9, "0.2 * 10 + 2 * 0.05 - 0.1 is not {reward}");
 }
 

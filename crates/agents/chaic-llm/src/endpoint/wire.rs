@@ -9,7 +9,7 @@ use ureq::Agent;
 
 use super::{Failure, NoReply, failure};
 use crate::exchange::FaultKind;
-use crate::key::Key;
+use crate::key::ApiKey;
 use crate::rate_limiter::POLL_INTERVAL;
 use crate::retry_after::retry_after;
 use crate::settings::{Endpoint, EndpointKind, Settings};
@@ -25,7 +25,7 @@ pub(super) struct Wire {
     agent: Agent,
     address: String,
     kind: EndpointKind,
-    key: Key,
+    key: ApiKey,
     max_answer_bytes: u64,
 }
 
@@ -42,7 +42,7 @@ pub(super) struct Response {
 }
 
 impl Wire {
-    pub(super) fn new(settings: &Settings, key: Key) -> Wire {
+    pub(super) fn new(settings: &Settings, key: ApiKey) -> Wire {
         let endpoint = &settings.endpoint;
         let Endpoint { kind, max_answer_bytes, timeout_secs, max_concurrent_requests, .. } =
             *endpoint;

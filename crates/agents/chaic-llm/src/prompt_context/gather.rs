@@ -4,7 +4,7 @@ use chaic_agents::behavior::ObservedInteraction;
 use chaic_agents::decision::{Context, Plan};
 use chaic_agents::mapping::MappedObject;
 use chaic_agents::memory::Memory;
-use chaic_agents::track::Carried;
+use chaic_agents::track::CarriedObject;
 use chaic_agents::{Intent, TrackId};
 use chaic_core::briefing::CompanionRole;
 use chaic_core::capability::{Capability, Gait, Impairments, PersonKind, Persona};
@@ -13,8 +13,8 @@ use chaic_core::{Action, AgentId, ClassId, Frame, Outcome, Role};
 
 use super::hands::put_away;
 use super::{
-    Body, Count, DisclosedFacts, GoalPlace, Interaction, Length, Map, ObjectFacts, PersonFacts,
-    PlanFacts, ProgressFacts, PromptContext, SelfFacts, plain, plan_text,
+    BodyFacts, ClassCount, DisclosedFacts, GoalPlace, Interaction, ListLimits, MapFacts,
+    ObjectFacts, PersonFacts, PlanFacts, ProgressFacts, PromptContext, SelfFacts, plain, plan_text,
 };
 use crate::prompt_track::PromptTrack;
 
@@ -37,7 +37,7 @@ impl PromptContext {
         plans: &[Plan],
         last_plan: Option<Plan>,
         images: usize,
-        length: Length,
+        length: ListLimits,
     ) -> (PromptContext, Vec<Plan>) {
         let Context { briefing, memory, .. } = *context;
         let listed = keep_nearest(plans, length.plans_per_kind);
@@ -76,7 +76,7 @@ impl PromptContext {
             ),
             wanted: wanted
                 .flat_map(|goal| &goal.targets)
-                .map(|(class, n)| Count { name: plain(class.info().label), count: *n })
+                .map(|(class, n)| ClassCount { name: plain(class.info().label), count: *n })
                 .collect(),
             own: self_facts(context, last_plan, length),
             others: other_agents(context, length),
@@ -125,14 +125,14 @@ pub(super) fn reach(capability: &Capability) -> Option<[String; 2]> {
     is_limited.then(|| [height(low), height(high)])
 }
 
-pub(super) fn body(capability: &Capability) -> Body {
+pub(super) fn body(capability: &Capability) -> BodyFacts {
     let height_m = capability.height_m;
     let kind = match capability.gait {
         Gait::Roll => "a person in a wheelchair".to_owned(),
         Gait::WalkBike => "a person who walks a bicycle".to_owned(),
         Gait::Walk => format!("a person of {height_m:.2} m"),
     };
-    Body {
+    BodyFacts {
         kind: impaired(kind, Impairments::from_capability(capability)),
         reach: reach(capability),
         strength_kg: capability.strength_kg as u32,
@@ -171,7 +171,7 @@ fn impaired(who: String, impairments: Impairments) -> String {
     descriptions.fold(format!("{who} who {first}"), sentence)
 }
 
-fn describe_held(held: &Carried) -> String {
+fn describe_held(held: &CarriedObject) -> String {
     let name = held.object.map_or("something".to_owned(), |(t, class)| named(t, Some(class)));
     let mut inside: Vec<String> = held.contents.iter().map(|(t, c)| named(*t, Some(*c))).collect();
     inside.resize(held.n_contents as usize, "something".to_owned());
@@ -184,7 +184,7 @@ fn describe_held(held: &Carried) -> String {
     }
 }
 
-fn self_facts(context: &Context<'_>, last_plan: Option<Plan>, length: Length) -> SelfFacts {
+fn self_facts(context: &Context<'_>, last_plan: Option<Plan>, length: ListLimits) -> SelfFacts {
     let Context { memory, briefing, .. } = *context;
     let (hands, usable) = (&memory.hands, briefing.capability.hands.all().iter());
     let here = memory.position();
@@ -233,7 +233,7 @@ fn interaction(
     Interaction { frame, action, outcome }
 }
 
-fn other_agents(context: &Context<'_>, length: Length) -> Vec<PersonFacts> {
+fn other_agents(context: &Context<'_>, length: ListLimits) -> Vec<PersonFacts> {
     let Context { briefing, memory, behavior, .. } = *context;
     let partner = briefing.companion(CompanionRole::Partner);
     // A partner is the guardian itself.
@@ -300,12 +300,12 @@ fn other_agents(context: &Context<'_>, length: Length) -> Vec<PersonFacts> {
 fn progress(context: &Context<'_>) -> ProgressFacts {
     let Context { briefing, memory, .. } = *context;
     let speed = briefing.capability.speed_m_per_frame.max(1e-3);
-    let mut delivered: Vec<Count> = Vec::new();
+    let mut delivered: Vec<ClassCount> = Vec::new();
     for class in memory.delivered.iter().filter_map(|e| memory.class_of(*e)) {
         let name = plain(class.info().label);
         match delivered.iter_mut().find(|c| c.name == name) {
             Some(count) => count.count += 1,
-            None => delivered.push(Count { name, count: 1 }),
+            None => delivered.push(ClassCount { name, count: 1 }),
         }
     }
     let place = |(object, path_m): &(&MappedObject, f32)| GoalPlace {
@@ -323,7 +323,7 @@ fn progress(context: &Context<'_>) -> ProgressFacts {
     }
 }
 
-fn map(context: &Context<'_>, length: Length) -> Map {
+fn map(context: &Context<'_>, length: ListLimits) -> MapFacts {
     let Context { briefing, memory, is_explored, .. } = *context;
     let kind = |class: ClassId| match () {
         () if briefing.possible_targets.contains(&class) => Some(None),
@@ -363,7 +363,7 @@ fn map(context: &Context<'_>, length: Length) -> Map {
             note,
         }
     };
-    Map { objects: objects.iter().map(facts).collect(), n_omitted, explored: is_explored }
+    MapFacts { objects: objects.iter().map(facts).collect(), n_omitted, explored: is_explored }
 }
 
 fn plan_facts(memory: &Memory, plan: &Plan) -> PlanFacts {

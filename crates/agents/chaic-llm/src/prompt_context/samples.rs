@@ -4,8 +4,8 @@ use chaic_core::capability::Persona;
 
 use super::gather::{body, meters, person, reach};
 use super::{
-    Count, DisclosedFacts, GoalPlace, Interaction, Map, ObjectFacts, PersonFacts, PlanFacts,
-    ProgressFacts, PromptContext, SelfFacts,
+    ClassCount, DisclosedFacts, GoalPlace, Interaction, MapFacts, ObjectFacts, PersonFacts,
+    PlanFacts, ProgressFacts, PromptContext, SelfFacts,
 };
 use crate::prompt_track::PromptTrack;
 
@@ -33,7 +33,7 @@ impl PromptContext {
                 strength_kg: 100,
             }),
             wanted: match track {
-                PromptTrack::Partner => vec![Count { name: "apple".to_owned(), count: 2 }],
+                PromptTrack::Partner => vec![ClassCount { name: "apple".to_owned(), count: 2 }],
                 PromptTrack::Hidden | PromptTrack::KnownTask => Vec::new(),
             },
             own: SelfFacts {
@@ -78,9 +78,9 @@ impl PromptContext {
                     path_m: meters(7.0),
                     frames: 220,
                 }],
-                delivered: vec![Count { name: "apple".to_owned(), count: 1 }],
+                delivered: vec![ClassCount { name: "apple".to_owned(), count: 1 }],
             },
-            map: Map {
+            map: MapFacts {
                 objects: vec![ObjectFacts {
                     kind: Some("container"),
                     name: "wicker basket #60".to_owned(),
@@ -131,7 +131,7 @@ impl PromptContext {
                     ..all.others[0].clone()
                 }],
                 progress: ProgressFacts { frame: 0, goal_places: vec![], delivered: vec![] },
-                map: Map { objects: vec![], n_omitted: 0, explored: false },
+                map: MapFacts { objects: vec![], n_omitted: 0, explored: false },
                 n_omitted_plans: 0,
                 ..all
             }

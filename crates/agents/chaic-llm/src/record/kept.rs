@@ -74,14 +74,14 @@ mod tests {
             let before = fs::read(&path).unwrap();
             let mut writer = open();
             writer.push(exchange("one")).unwrap();
-            assert_eq!(writer.take_kept(), None);
+            assert_eq!(writer.take_copy_path(), None);
             writer.push(exchange(other)).unwrap();
-            let copy = writer.take_kept().unwrap();
+            let copy = writer.take_copy_path().unwrap();
             assert!(copy.ends_with(format!("x.old-1-s0.1.jsonl.old-{}", number + 1)), "{copy:?}");
             assert_eq!(fs::read(&copy).unwrap(), before);
             // The second difference has nothing left to keep.
             writer.push(decided(3)).unwrap();
-            assert_eq!(writer.take_kept(), None);
+            assert_eq!(writer.take_copy_path(), None);
             kept.push(copy);
         }
         // Decisions alone cost nothing.

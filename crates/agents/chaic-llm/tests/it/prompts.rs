@@ -11,7 +11,7 @@ use chaic_env::helper_registry::{Helper, built_in};
 use chaic_env::{Env, EpisodeAgents, EpisodeConfig};
 use chaic_episodes::find_episode;
 use chaic_llm::LanguageHelpers;
-use chaic_llm::prompt_context::{LENGTHS, PersonFacts, PromptContext};
+use chaic_llm::prompt_context::{LIST_LIMITS, PersonFacts, PromptContext};
 use chaic_llm::prompt_track::PromptTrack;
 use chaic_llm::tokens;
 use chaic_llm_standin::Options;
@@ -126,7 +126,7 @@ impl Policy for ContextCollector {
 
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
         let (facts, _) =
-            PromptContext::new(PromptTrack::Partner, context, valid, None, 0, LENGTHS[0]);
+            PromptContext::new(PromptTrack::Partner, context, valid, None, 0, LIST_LIMITS[0]);
         self.contexts.lock().unwrap().push(facts);
         Ok(Plan::Wait)
     }

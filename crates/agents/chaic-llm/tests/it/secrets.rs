@@ -2,9 +2,9 @@
 
 use chaic_core::{AgentId, TaskId};
 use chaic_llm::endpoint::Client;
-use chaic_llm::key::Key;
+use chaic_llm::key::ApiKey;
 use chaic_llm::language::LanguageHelpers;
-use chaic_llm::session::Source;
+use chaic_llm::session::AnswerSource;
 use chaic_llm::settings::{EndpointKind, FailureAction};
 use chaic_llm::show::{self, Detail};
 use chaic_llm_standin::{Options, ResponseMode};
@@ -30,9 +30,9 @@ fn no_output_or_file_contains_the_key() {
         let (standin, mut settings) = standin(Options { response_mode, key, ..Options::default() });
         settings.endpoint.kind = kind;
         settings.retry.on_failure = FailureAction::Pause;
-        let client = Client::with_key(&settings, Key::new(KEY));
+        let client = Client::with_key(&settings, ApiKey::new(KEY));
         let language =
-            LanguageHelpers::with(settings, Source::Live(Box::new(client)), flag()).unwrap();
+            LanguageHelpers::with(settings, AnswerSource::Live(Box::new(client)), flag()).unwrap();
         let (is_complete, results) = fixture.play(name, &fixture.request(&["llm"]), &language);
         assert_eq!(is_complete, name != "wrong");
         assert!(standin.stats().requests > 0);
@@ -60,8 +60,9 @@ fn redirects_are_not_followed() {
     let redirects_to = Some(format!("{}/chat/completions", other.url()));
     let (named, mut settings) = standin(Options { redirects_to, ..Options::default() });
     settings.retry.on_failure = FailureAction::Pause;
-    let client = Client::with_key(&settings, Key::new(KEY));
-    let language = LanguageHelpers::with(settings, Source::Live(Box::new(client)), flag()).unwrap();
+    let client = Client::with_key(&settings, ApiKey::new(KEY));
+    let language =
+        LanguageHelpers::with(settings, AnswerSource::Live(Box::new(client)), flag()).unwrap();
     let (is_complete, _) = fixture.play("run", &fixture.request(&["llm"]), &language);
     assert!(!is_complete);
     assert_eq!((named.stats().requests, other.stats().requests), (1, 0));

@@ -15,7 +15,7 @@ use chaic_core::{Action, Agent, AgentError, Briefing, Observation};
 use chaic_env::helper_registry::{BuiltInHelpers, Helper, HelperRegistry};
 use chaic_study::data::CODE_ALPHABET;
 use chaic_study::{Study, StudyPlan};
-use chaic_study_server::{Counts, ServerError, ServerOptions, StudyServer};
+use chaic_study_server::{ParticipantCounts, ServerError, ServerOptions, StudyServer};
 use serde_json::{Value, json};
 
 pub const DEFINITION: &str = r#"title = "Shelves"
@@ -187,7 +187,7 @@ pub struct Server {
     stop: Arc<AtomicBool>,
     now_secs: Arc<AtomicU64>,
     problems: Arc<Mutex<Vec<String>>>,
-    thread: Option<JoinHandle<Counts>>,
+    thread: Option<JoinHandle<ParticipantCounts>>,
 }
 
 impl Server {
@@ -203,7 +203,7 @@ impl Server {
         Client { address: self.address, code: code(n), token: format!("{n:064x}") }
     }
 
-    pub fn stop(mut self) -> Counts {
+    pub fn stop(mut self) -> ParticipantCounts {
         self.stop.store(true, Ordering::SeqCst);
         self.thread.take().expect("it runs").join().expect("no panic")
     }

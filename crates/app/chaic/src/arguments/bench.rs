@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use chaic_bench::{parse_channels, parse_channels_or_none};
 use chaic_episodes::house;
 use chaic_render::Channels;
-use chaic_render::geometry::FINEST;
+use chaic_render::geometry::FINEST_LEVEL;
 use clap::{Args, Subcommand, ValueEnum};
 
 use super::{Tasks, tasks};
@@ -26,8 +26,8 @@ pub struct SceneArguments {
     #[arg(long, value_name = "FILE", value_parser = glb_file)]
     pub out: PathBuf,
     /// Level of detail, 0 to 6; 6 is the finest.
-    #[arg(long, value_name = "LEVEL", default_value_t = FINEST as u8,
-        value_parser = clap::value_parser!(u8).range(0..=FINEST as i64))]
+    #[arg(long, value_name = "LEVEL", default_value_t = FINEST_LEVEL as u8,
+        value_parser = clap::value_parser!(u8).range(0..=FINEST_LEVEL as i64))]
     pub detail: u8,
     /// Leave out ceilings for views from above.
     #[arg(long)]

@@ -121,7 +121,7 @@ pub struct OriginalArguments {
     pub out: PathBuf,
     /// Import one half only, for example test [default: every half that exists].
     #[arg(long, value_name = "HALF")]
-    pub split: Option<ImportHalf>,
+    pub split: Option<ImportSplit>,
     /// Skip episodes that cannot be imported and list them; the exit code is 1 if any was skipped.
     #[arg(long)]
     pub keep_going: bool,
@@ -129,7 +129,7 @@ pub struct OriginalArguments {
 
 /// A half of the original data set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum ImportHalf {
+pub enum ImportSplit {
     /// Floor plans 1 and 4.
     Train,
     /// Floor plans 2 and 5.

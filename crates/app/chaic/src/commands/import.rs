@@ -2,10 +2,10 @@
 
 use anyhow::Result;
 use chaic_files::{create_folders, write_atomically};
-use chaic_import::{Half, OnError, Sources, import};
+use chaic_import::{OnError, SourceSplit, Sources, import};
 use serde_json::json;
 
-use crate::arguments::{ImportCommand, ImportHalf, OriginalArguments};
+use crate::arguments::{ImportCommand, ImportSplit, OriginalArguments};
 use crate::exit::ExitStatus;
 use crate::output::{OutputFormat, counted, json_path, print_error, print_result};
 
@@ -20,8 +20,8 @@ pub fn run(command: &ImportCommand, format: OutputFormat) -> Result<ExitStatus> 
 fn original(arguments: &OriginalArguments, format: OutputFormat) -> Result<ExitStatus> {
     let OriginalArguments { dataset, tdw, out, split, keep_going } = arguments;
     let half = split.map(|half| match half {
-        ImportHalf::Train => Half::Train,
-        ImportHalf::Test => Half::Test,
+        ImportSplit::Train => SourceSplit::Train,
+        ImportSplit::Test => SourceSplit::Test,
     });
     let sources = Sources { dataset: dataset.clone(), tdw: tdw.clone(), half };
     let on_error = if *keep_going { OnError::Skip } else { OnError::Stop };

@@ -7,7 +7,7 @@ use chaic_agents::HelperInfo;
 use chaic_agents::partners::{PartnerVariant, partner_habits};
 use chaic_core::capability::{IMPAIRMENTS, Persona};
 use chaic_core::observation::Grants;
-use chaic_core::task::{Origin, TASKS};
+use chaic_core::task::{TASKS, TaskOrigin};
 use chaic_env::helper_registry::{NONE, RULES};
 use chaic_env::partner_suite::{PartnerSuite, SuitePartner};
 use chaic_env::rules::{RuleSet, differing_rules, rule_names, rule_values};
@@ -91,7 +91,7 @@ fn tasks(format: OutputFormat) -> Result<()> {
     let mut rows = Vec::new();
     let mut table = table(["Name", "Scene", "Partner", "Frames", "Origin"]);
     for task in &TASKS {
-        let origin = if task.origin == Origin::Chaic { "chaic" } else { "paper" };
+        let origin = if task.origin == TaskOrigin::Chaic { "chaic" } else { "paper" };
         let scene = format!("{:?}", task.scene).to_lowercase();
         let partner = task.partner.to_string();
         table.add_row([task.name, &scene, &partner, &task.horizon.to_string(), origin]);

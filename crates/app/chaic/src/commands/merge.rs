@@ -41,14 +41,14 @@ fn merge_partners(arguments: &MergeArguments, format: OutputFormat) -> Result<Ex
         return Err(EvalError::Options(text).into());
     }
     let (folder, merged) = SuiteFolder::merge(&arguments.out, &arguments.runs)?;
-    let mut is_good = true;
+    let mut has_passed = true;
     for run in &merged {
         let extent = run.progress();
-        is_good &= extent.finished == extent.total && extent.errors == 0;
+        has_passed &= extent.finished == extent.total && extent.errors == 0;
         if extent.finished > 0 {
             write_report(run.folder(), &report_of(run), &shown_language(run.folder().path()))?;
         }
     }
     print_robustness(&folder, format, None)?;
-    Ok(ExitStatus::from_findings(!is_good))
+    Ok(ExitStatus::from_findings(!has_passed))
 }

@@ -13,7 +13,7 @@ use chaic_vision::coco::{ANNOTATIONS, DETECTIONS, annotate, annotations_json, re
 use chaic_vision::evaluate::{DetectionReport, MIN_AREA_PX, MIN_FREQUENT_INSTANCES, report};
 use chaic_vision::instances::Instance;
 use chaic_vision::perception_registry::{read_behavior, read_detector};
-use chaic_vision::track_evaluation::{self, EpisodeFailure, Rate, TrackReport};
+use chaic_vision::track_evaluation::{self, EpisodeFailure, RateEstimate, TrackReport};
 use chaic_vision::trained::TrainedDetector;
 use chaic_vision::views::LabeledView;
 use clap::ValueEnum;
@@ -139,7 +139,8 @@ fn option_name(value: &impl ValueEnum) -> String {
 }
 
 fn tracks_text(report: &TrackReport, perception: &str) -> String {
-    let rate = |r: &Rate| format!("{} +- {} of {}", number(r.value), number(r.interval), r.n);
+    let rate =
+        |r: &RateEstimate| format!("{} +- {} of {}", number(r.value), number(r.interval), r.n);
     let mut text = format!(
         "{}, {}, {perception} perception\n\
          precision of detections     {}\n\

@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 use anyhow::Result;
 use chaic_core::geom::Camera;
 use chaic_core::observation::SensorConfig;
-use chaic_eval::replay::{self, Masks, ReplayOptions};
+use chaic_eval::replay::{self, MaskDetector, ReplayOptions};
 use chaic_eval::run::RunOptions;
 use chaic_vision::error_breakdown::REPORT_SCORE;
 use chaic_vision::perception_registry::{read_detector, weights_of};
@@ -41,7 +41,7 @@ pub fn run(arguments: &ReplayArguments, format: OutputFormat) -> Result<ExitStat
         }
     };
     let mut detector = masks.then(|| detector_of(&options)).transpose()?.map(DetectedMasks::new);
-    let masks = detector.as_mut().map(|detector| detector as &mut dyn Masks);
+    let masks = detector.as_mut().map(|detector| detector as &mut dyn MaskDetector);
     let images = replay::write(&trace, &episode, video, masks, out, &mut progress);
     bar.finish_and_clear();
     let Some(images) = images? else {
@@ -81,7 +81,7 @@ impl DetectedMasks {
     }
 }
 
-impl Masks for DetectedMasks {
+impl MaskDetector for DetectedMasks {
     fn find(&mut self, rgb: &[u8], depth_m: &[f32], camera: &Camera) -> Vec<(u8, Vec<u32>)> {
         let found = self.detector.detect(rgb, depth_m, camera, &mut self.inference);
         let reported = found.into_iter().filter(|instance| instance.score() >= REPORT_SCORE);

@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use chaic_eval::EvalError;
 use chaic_eval::calibration::read_scores;
 use chaic_eval::losses::Losses;
-use chaic_eval::metrics::{FormulaSet, RunResult, tally};
+use chaic_eval::metrics::{FormulaSet, RunResult, result_of_trace};
 use chaic_eval::report::{Format, Report, untraced_failures, untraced_note, write_figure};
 use chaic_eval::run::{
     ComparedRun, EpisodeJob, RunFolder, RunOptions, check_same_episodes, planned, read_results,
@@ -146,7 +146,7 @@ fn from_journal(folder: &RunFolder, planned: &[EpisodeJob]) -> Result<Vec<RunRes
 fn from_traces(folder: &RunFolder, planned: &[EpisodeJob]) -> Result<Vec<RunResult>> {
     let mut results = Vec::new();
     let warnings = visit_planned_traces(folder, planned, &mut |trace| {
-        results.extend(tally(trace));
+        results.extend(result_of_trace(trace));
         Ok(())
     })?;
     warnings.iter().for_each(|warning| print_warning(warning));

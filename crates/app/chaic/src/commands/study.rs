@@ -12,7 +12,9 @@ use chaic_page::study_page;
 use chaic_sandbox::Launcher;
 use chaic_study::deletion::{DERIVED, delete};
 use chaic_study::export::{VerifiedTrial, export};
-use chaic_study::{Balance, Seat, Simulator, Study, StudyPlan, Trial, page_content, simulate};
+use chaic_study::{
+    DesignBalance, Seat, Simulator, Study, StudyPlan, Trial, page_content, simulate,
+};
 use serde_json::json;
 
 use super::{bars, table};
@@ -77,8 +79,8 @@ fn check(arguments: &StudyCheckArguments, format: OutputFormat) -> Result<ExitSt
     Ok(ExitStatus::Success)
 }
 
-fn check_text(plan: &StudyPlan, balance: &Balance, dropout: u8) -> String {
-    let Balance { arrived, completed, late, open_blocks, .. } = balance;
+fn check_text(plan: &StudyPlan, balance: &DesignBalance, dropout: u8) -> String {
+    let DesignBalance { arrived, completed, late, open_blocks, .. } = balance;
     let orders = plan.assignment().orders();
     let mut counts = table(["condition", "name", "complete, by position"]);
     for (condition, c) in plan.conditions().iter().enumerate() {

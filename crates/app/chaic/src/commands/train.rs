@@ -115,6 +115,7 @@ fn train<T: Trainer>(
     bar.set_length(steps);
     bar.set_position(done);
     let start = Instant::now();
+    let mut is_plotted = true;
     let is_finished = run.run(stop, &mut |record| {
         let metrics: Vec<String> =
             record.metrics.iter().map(|(name, x)| format!("{name} {x:.3}")).collect();
@@ -128,8 +129,10 @@ fn train<T: Trainer>(
                 let s = start.elapsed().as_secs();
                 print_progress(&format!("step {}, {s} s: {metrics}", record.step));
                 // A failed plot does not stop the training, because the curves file has all
-                // metrics.
-                if let Err(e) = draw_curves(&arguments.out) {
+                // metrics. The next validation or the end of the training draws it again.
+                let plot = draw_curves(&arguments.out);
+                is_plotted = plot.is_ok();
+                if let Err(e) = plot {
                     print_error(&format!("{e:#}"));
                 }
             }),
@@ -141,6 +144,9 @@ fn train<T: Trainer>(
         let steps = counted(steps as usize, "step");
         print_error(&format!("stopped after {done} of {steps}; {how_to_resume}"));
         return Ok(ExitStatus::Interrupted);
+    }
+    if !is_plotted {
+        draw_curves(&arguments.out)?;
     }
     let weights = arguments.out.join(T::WEIGHTS);
     let evaluate = names.evaluate.replace("FILE", &quoted_path(&weights));

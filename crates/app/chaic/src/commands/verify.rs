@@ -28,7 +28,7 @@ pub fn run(arguments: &VerifyArguments, format: OutputFormat) -> Result<ExitStat
     }
     let verdict = verdict(&arguments.run, arguments)?;
     print_result(format, &to_json(&verdict), &text(&verdict))?;
-    Ok(ExitStatus::from_findings(!verdict.is_good()))
+    Ok(ExitStatus::from_findings(!verdict.has_passed()))
 }
 
 /// Verifies the run in a folder, and prints its warnings.
@@ -65,13 +65,13 @@ fn verify_partners(arguments: &VerifyArguments, format: OutputFormat) -> Result<
     // Incomplete records are reported when each run is verified below.
     let (runs, _) = folder.runs()?;
     let findings = folder.findings(&runs)?;
-    let mut is_good = findings.is_empty();
+    let mut has_passed = findings.is_empty();
     let mut all_text: String =
         findings.iter().map(|finding| format!("FOUND {finding}\n")).collect();
     let mut of_partners = serde_json::Map::new();
     for entry in folder.partners() {
         let verdict = verdict(&folder.run_path(&entry), arguments)?;
-        is_good &= verdict.is_good();
+        has_passed &= verdict.has_passed();
         all_text += &format!("{}: {}", entry.name, text(&verdict));
         of_partners.insert(entry.name, to_json(&verdict));
     }
@@ -81,12 +81,12 @@ fn verify_partners(arguments: &VerifyArguments, format: OutputFormat) -> Result<
         "the folder has findings beside those of its runs\n"
     };
     let json = json!({
-        "passed": is_good,
+        "passed": has_passed,
         "findings": findings.iter().map(finding_json).collect::<Vec<_>>(),
         "partners": of_partners,
     });
     print_result(format, &json, &all_text)?;
-    Ok(ExitStatus::from_findings(!is_good))
+    Ok(ExitStatus::from_findings(!has_passed))
 }
 
 /// Replays a trace that belongs to no run, such as that of a game in a browser.
@@ -126,7 +126,7 @@ fn to_json(verdict: &VerificationReport) -> Value {
     };
     let coverage = &verdict.coverage;
     json!({
-        "passed": verdict.is_good(),
+        "passed": verdict.has_passed(),
         "traces": { "agreeing": verdict.agreeing, "decisions": verdict.decisions },
         "mismatches": verdict.mismatches.iter().map(mismatch).collect::<Vec<_>>(),
         "findings": verdict.findings.iter().map(finding_json).collect::<Vec<_>>(),
@@ -167,7 +167,7 @@ fn report_text(state: &ReportState) -> String {
         ReportState::OtherVersion(chaic) => format!(
             "the report is NOT CHECKED, because chaic {chaic} started the run; verify it with that version"
         ),
-        state @ ReportState::Compared { .. } if state.is_good() => {
+        state @ ReportState::Compared { .. } if state.has_passed() => {
             "the report agrees with the results".to_owned()
         }
         ReportState::Compared { missing, altered } => [

@@ -108,10 +108,10 @@ fn a_submission_plays_the_committed_partners() {
 
     // A commitment to the short episode and other partners, or none.
     commitment["episodes_sha256"] = score["conditions"]["episodes_sha256"].clone();
-    let verify = |commitment: &Value, is_good: bool| {
+    let verify = |commitment: &Value, has_passed: bool| {
         fs::write(at.join("c.json"), commitment.to_string()).expect("the disk has space");
         let verify = ["submit", "verify", "results/mine", "--commitment", "c.json"];
-        if is_good { run_ok(at, &verify) } else { run_err(at, &verify) }
+        if has_passed { run_ok(at, &verify) } else { run_err(at, &verify) }
     };
     assert!(verify(&commitment, true).contains("confirmed by 6 traces"));
     let mut other = commitment.clone();

@@ -58,15 +58,15 @@ fn the_largest_observation_is_bounded() {
 #[test]
 fn without_the_grant_of_the_state_nothing_is_written() {
     let others = Grants { state: false, ..Grants::ALL };
-    let absent = serde_json::to_string(&(others, Granted::default())).unwrap();
+    let absent = serde_json::to_string(&(others, GrantedInfo::default())).unwrap();
     assert!(!absent.contains("state"), "{absent}");
-    let granted = Granted { state: Some(WorldState::default()), ..Granted::default() };
+    let granted = GrantedInfo { state: Some(WorldState::default()), ..GrantedInfo::default() };
     let written = serde_json::to_string(&(Grants::ALL, &granted)).unwrap();
     assert_eq!(
-        serde_json::from_str::<(Grants, Granted)>(&written).unwrap(),
+        serde_json::from_str::<(Grants, GrantedInfo)>(&written).unwrap(),
         (Grants::ALL, granted)
     );
-    let (grants, granted): (Grants, Granted) = serde_json::from_str(&absent).unwrap();
+    let (grants, granted): (Grants, GrantedInfo) = serde_json::from_str(&absent).unwrap();
     assert_eq!((grants, granted.state), (others, None));
 }
 
@@ -129,13 +129,13 @@ fn a_history_needs_an_interval() {
     assert_eq!(SensorConfig::NONE.check(), Ok(()));
 }
 
-fn held(in_both_hands: bool) -> Option<Held> {
+fn held(in_both_hands: bool) -> Option<HeldObject> {
     let class = ClassId::named("apple");
     let identity = Some(HeldIdentity { entity: EntityId(7), class, contents: Vec::new() });
-    Some(Held { n_contents: 0, in_both_hands, identity })
+    Some(HeldObject { n_contents: 0, in_both_hands, identity })
 }
 
-fn with_hands(hands: [Option<Held>; 2]) -> Proprioception {
+fn with_hands(hands: [Option<HeldObject>; 2]) -> Proprioception {
     let pose = Pose { position: Vec3::ZERO, yaw_rad: 0.0 };
     Proprioception { pose, hands, last: None, other_end: None }
 }
@@ -156,9 +156,9 @@ fn furniture_in_both_hands_is_one_object() {
 #[test]
 fn classes_are_those_of_the_image() {
     let classes = ["apple", "bed"].map(ClassId::named);
-    let granted = Granted {
+    let granted = GrantedInfo {
         classes: vec![(EntityId(7), classes[0]), (EntityId(9), classes[1])],
-        ..Granted::default()
+        ..GrantedInfo::default()
     };
     let found = [6, 7, 8, 9, 10].map(|id| granted.class_of(EntityId(id)));
     assert_eq!(found, [None, Some(classes[0]), None, Some(classes[1]), None]);
@@ -186,7 +186,7 @@ fn without_ids_the_other_grants_remain() {
         },
         images: Images { rgb: Some(vec![1; 3]), depth_m: Some(vec![2.0]), ids: Some(vec![7]) },
         frame_history: Vec::new(),
-        granted: Granted {
+        granted: GrantedInfo {
             classes: vec![apple],
             delivered: vec![apple],
             removed: vec![EntityId(8)],
@@ -204,7 +204,7 @@ fn without_ids_the_other_grants_remain() {
         expected.granted.removed.clear();
         expected.granted.delivered.truncate(usize::from(progress));
         expected.proprioception.hands =
-            [held(false).map(|held| Held { identity: None, ..held }), None];
+            [held(false).map(|held| HeldObject { identity: None, ..held }), None];
         let grants = Grants { progress, ..Grants::ALL };
         assert_eq!(seen.without_ids(grants), expected, "progress: {progress}");
     }

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::{fs, io};
 
 use chaic_core::TaskId;
-use chaic_import::{Half, ImportError, OnError, Sources, import};
+use chaic_import::{ImportError, OnError, SourceSplit, Sources, import};
 use serde_json::{Value, json};
 
 use super::inputs::Inputs;
@@ -20,7 +20,8 @@ pub fn parse(inputs: &Inputs, bytes: &[u8]) -> Result<(), String> {
     let folder = inputs.scratch.join("original");
     write(&folder, bytes).expect("the scratch folder is writable");
     let half = folder.join("train");
-    let sources = Sources { tdw: folder.join("tdw"), dataset: folder, half: Some(Half::Train) };
+    let sources =
+        Sources { tdw: folder.join("tdw"), dataset: folder, half: Some(SourceSplit::Train) };
     let imported = import(&sources, OnError::Skip).map_err(|error| error.to_string())?;
     // The data set has one task; the folders of the others are missing.
     let is_other_task = |error: &ImportError| match error {

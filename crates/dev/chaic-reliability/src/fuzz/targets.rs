@@ -22,13 +22,13 @@ use chaic_learn::train::{CloningConfig, PolicyTrainer, PpoTrainingConfig};
 use chaic_learn::visual::train::VisualTrainer;
 use chaic_llm::endpoint::Client;
 use chaic_llm::exchange::Reply;
-use chaic_llm::key::Key;
+use chaic_llm::key::ApiKey;
 use chaic_llm::record::DecisionLog;
 use chaic_llm::templates::Templates;
 use chaic_llm::{Settings, answer};
 use chaic_nn::weights;
 use chaic_study::{ParticipantData, RecordCheck};
-use chaic_study_server::Turn;
+use chaic_study_server::AdvanceRequest;
 use chaic_subprocess::frame::{MAX_BODY, MessageFrame};
 use chaic_subprocess::message::{PROTOCOL, ResponseMessage, SensorRequest};
 use chaic_subprocess::serve::serve;
@@ -254,7 +254,7 @@ fn llm_templates(inputs: &Inputs, bytes: &[u8]) -> Result<(), String> {
 
 /// Parses the body of a response, and the answer in it.
 fn llm_reply(_: &Inputs, bytes: &[u8]) -> Result<(), String> {
-    let client = Client::with_key(&Settings::default(), Key::new("secret"));
+    let client = Client::with_key(&Settings::default(), ApiKey::new("secret"));
     let reply = client.parse_reply(&inputs::request(), bytes.to_vec(), Duration::ZERO);
     match reply.map_err(|failure| failure.fault.detail)? {
         Reply::Answer { text, .. } => choose(&text),
@@ -369,5 +369,5 @@ fn study_data(inputs: &Inputs, bytes: &[u8]) -> Result<(), String> {
 
 fn study_turn(_: &Inputs, bytes: &[u8]) -> Result<(), String> {
     let text = str::from_utf8(bytes).map_err(message)?;
-    Turn::parse(text).map(drop).map_err(message)
+    AdvanceRequest::parse(text).map(drop).map_err(message)
 }

@@ -3,7 +3,7 @@
 use std::io::{self, BufWriter, Read as _, Write};
 use std::path::Path;
 
-use chaic_files::{Entry, EntryKind, FileError, LOCK, TemporaryFile, open_file, walk};
+use chaic_files::{DirectoryEntry, EntryKind, FileError, LOCK, TemporaryFile, open_file, walk};
 use sha2::{Digest as _, Sha256};
 use tar::{EntryType, Header};
 
@@ -101,7 +101,7 @@ impl<W: Write> Write for Hashed<W> {
 fn write_archive(folder: &Path, with_origins: bool, output: &mut dyn Write) -> Result<usize> {
     let mut paths = Paths::default();
     let (mut n_files, mut total) = (0, 0);
-    for Entry { path, kind } in walk(folder, MAX_DEPTH as u32 - 1)? {
+    for DirectoryEntry { path, kind } in walk(folder, MAX_DEPTH as u32 - 1)? {
         if path.file_name().is_some_and(|name| name == LOCK) {
             continue;
         }

@@ -1,9 +1,9 @@
 //! Information that a helper has at its first decision, and tests of whether it predicts the task
 //! or the partner.
 //!
-//! [`Opening`] holds the briefing and the first observation of a helper. [`distinct`] counts
-//! different openings, [`predict`] predicts a label from start poses, and [`varying_fields`] lists
-//! the fields that differ between openings of one scene kind.
+//! [`InitialInformation`] holds the briefing and the first observation of a helper. [`distinct`]
+//! counts different openings, [`predict`] predicts a label from start poses, and
+//! [`varying_fields`] lists the fields that differ between openings of one scene kind.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -26,7 +26,7 @@ const PERMUTATIONS: u32 = 100;
 
 /// Information that a helper has at its first decision.
 #[derive(Clone, Debug)]
-pub struct Opening {
+pub struct InitialInformation {
     /// Hidden from the helper: the task.
     pub task: TaskId,
     /// Hidden from the helper: the partner's kind of person.
@@ -43,12 +43,16 @@ pub struct Opening {
     pub images: Digest,
 }
 
-impl Opening {
+impl InitialInformation {
     /// Returns the opening of an episode for a helper with these grants and sensors.
     ///
     /// # Errors
     /// If the episode can't be played.
-    pub fn new(episode: &Episode, grants: Grants, sensors: SensorConfig) -> Result<Opening> {
+    pub fn new(
+        episode: &Episode,
+        grants: Grants,
+        sensors: SensorConfig,
+    ) -> Result<InitialInformation> {
         let config = EpisodeConfig {
             // The partner's images are not used, so they are as small as possible.
             image_size: Some(*SensorConfig::IMAGE_SIZES.start()),
@@ -67,7 +71,7 @@ impl Opening {
         let pixels: Vec<u8> = images.rgb.iter().flatten().copied().chain(depth).collect();
         let setup = episode.setup();
         let info = setup.task.info();
-        Ok(Opening {
+        Ok(InitialInformation {
             task: setup.task,
             partner: setup.people.first().map_or(info.partner, |person| person.kind()),
             scene: info.scene,
@@ -101,14 +105,17 @@ fn fields(value: &Value) -> BTreeMap<String, String> {
 }
 
 /// Returns the number of different keys of the openings.
-pub fn distinct<K: Ord>(openings: &[&Opening], key: impl Fn(&Opening) -> K) -> usize {
+pub fn distinct<K: Ord>(
+    openings: &[&InitialInformation],
+    key: impl Fn(&InitialInformation) -> K,
+) -> usize {
     openings.iter().map(|opening| key(opening)).collect::<BTreeSet<K>>().len()
 }
 
 /// Returns the fields that differ between openings, with their numbers of values.
 pub fn varying_fields(
-    openings: &[&Opening],
-    fields: impl Fn(&Opening) -> &BTreeMap<String, String>,
+    openings: &[&InitialInformation],
+    fields: impl Fn(&InitialInformation) -> &BTreeMap<String, String>,
 ) -> Vec<(String, usize)> {
     let names: BTreeSet<&String> =
         openings.iter().flat_map(|opening| fields(opening).keys()).collect();
@@ -181,7 +188,10 @@ fn other_fold(i: usize, n: usize) -> impl Iterator<Item = usize> {
 
 /// Predicts each opening's label from the labels of the nearest start poses in the other fold.
 /// Coordinates are scaled to unit variance.
-pub fn predict(openings: &[&Opening], label: impl Fn(&Opening) -> String) -> Prediction {
+pub fn predict(
+    openings: &[&InitialInformation],
+    label: impl Fn(&InitialInformation) -> String,
+) -> Prediction {
     let n = openings.len();
     let scales: [f64; 4] = std::array::from_fn(|k| {
         let mean = openings.iter().map(|o| o.pose[k]).sum::<f64>() / n as f64;
@@ -189,7 +199,7 @@ pub fn predict(openings: &[&Opening], label: impl Fn(&Opening) -> String) -> Pre
         let variance = squares.sum::<f64>() / n as f64;
         1.0 / variance.sqrt().max(1e-9)
     });
-    let distance = |a: &Opening, b: &Opening| -> f64 {
+    let distance = |a: &InitialInformation, b: &InitialInformation| -> f64 {
         let scaled = (0..4).map(|k| (a.pose[k] - b.pose[k]) * scales[k]);
         scaled.map(|x| x * x).sum()
     };
@@ -207,9 +217,9 @@ pub fn predict(openings: &[&Opening], label: impl Fn(&Opening) -> String) -> Pre
 /// Predicts each opening's label from the openings of the other fold with the same value of a
 /// field.
 pub fn predict_by_value(
-    openings: &[&Opening],
-    value: impl Fn(&Opening) -> Option<String>,
-    label: impl Fn(&Opening) -> String,
+    openings: &[&InitialInformation],
+    value: impl Fn(&InitialInformation) -> Option<String>,
+    label: impl Fn(&InitialInformation) -> String,
 ) -> Prediction {
     let values: Vec<Option<String>> = openings.iter().map(|opening| value(opening)).collect();
     let same = |i: usize| other_fold(i, values.len()).filter(|j| values[*j] == values[i]).collect();
@@ -221,8 +231,8 @@ pub fn predict_by_value(
 mod tests {
     use super::*;
 
-    fn opening(task: TaskId, x: f64) -> Opening {
-        Opening {
+    fn opening(task: TaskId, x: f64) -> InitialInformation {
+        InitialInformation {
             task,
             partner: task.info().partner,
             scene: task.info().scene,
@@ -233,13 +243,13 @@ mod tests {
         }
     }
 
-    fn label(opening: &Opening) -> String {
+    fn label(opening: &InitialInformation) -> String {
         opening.task.to_string()
     }
 
     #[test]
     fn a_dependence_is_found_if_there_is_one() {
-        let openings = |is_dependent: bool| -> Vec<Opening> {
+        let openings = |is_dependent: bool| -> Vec<InitialInformation> {
             let mut random = RngStream::new(1, "openings", 0);
             let tasks = [TaskId::HighTarget, TaskId::LowTarget];
             (0..200)
@@ -252,7 +262,7 @@ mod tests {
         };
         for is_dependent in [true, false] {
             let all = openings(is_dependent);
-            let all: Vec<&Opening> = all.iter().collect();
+            let all: Vec<&InitialInformation> = all.iter().collect();
             let by_pose = predict(&all, label);
             let by_value = predict_by_value(&all, |o| o.proprioception.get("x").cloned(), label);
             for found in [by_pose, by_value] {

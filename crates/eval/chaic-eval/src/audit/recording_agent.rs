@@ -59,7 +59,7 @@ impl ObservationLog {
         if self.leak.is_none() {
             return;
         }
-        let class = |e: EntityId| world.setup().thing(e).map(|t| (e, t.class));
+        let class = |e: EntityId| world.setup().object(e).map(|t| (e, t.class));
         let is_held = |e: &EntityId| {
             let mut holders = world.setup().agents().filter(|a| *a != AgentId::HELPER);
             holders.any(|a| world.state().agents[a.index()].hands.contains(&Some(*e)))

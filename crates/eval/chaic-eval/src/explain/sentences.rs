@@ -2,7 +2,10 @@
 
 use std::fmt::Write as _;
 
-use super::{Change, DeliveryCounts, EndSummary, Explanation, FinalBelief, ModeChange, Shift};
+use super::{
+    DeliveryCounts, EndSummary, Explanation, FinalBelief, HypothesisChange, ModeChange,
+    TimelineChange,
+};
 use crate::recorded_belief::Distribution;
 use crate::report::capitalized;
 
@@ -20,10 +23,10 @@ pub(super) fn text(explanation: &Explanation) -> String {
 }
 
 /// Describes a change.
-pub(super) fn describe(change: &Change) -> String {
+pub(super) fn describe(change: &TimelineChange) -> String {
     match change {
-        Change::FirstBelief { goals, people } => first_belief(goals, people),
-        Change::Evidence { added, retracted, goal } => {
+        TimelineChange::FirstBelief { goals, people } => first_belief(goals, people),
+        TimelineChange::Evidence { added, retracted, goal } => {
             let part = |verb: &str, observations: &[String]| {
                 (!observations.is_empty()).then(|| format!("{verb}: {}.", observations.join(", ")))
             };
@@ -31,27 +34,31 @@ pub(super) fn describe(change: &Change) -> String {
             let parts = [part("Saw", added), part("Retracted", retracted), goal];
             parts.into_iter().flatten().collect::<Vec<_>>().join(" ")
         }
-        Change::Goal(shift) => format!("It believes that the goal is {}.", shift_text(shift)),
-        Change::Person(Shift { hypothesis, probability, previous }) => {
+        TimelineChange::Goal(shift) => {
+            format!("It believes that the goal is {}.", shift_text(shift))
+        }
+        TimelineChange::Person(HypothesisChange { hypothesis, probability, previous }) => {
             let (who, now, before) =
                 (person(hypothesis), percent(*probability), percent(*previous));
             format!("It believes that the partner is {who}: {now} (was {before}).")
         }
-        Change::Plan { mode: Some(mode), operations } => {
+        TimelineChange::Plan { mode: Some(mode), operations } => {
             format!("{}: {}.", mode_text(mode), operations.join(", "))
         }
-        Change::Plan { mode: None, operations } if operations.is_empty() => {
+        TimelineChange::Plan { mode: None, operations } if operations.is_empty() => {
             "It has no plan.".to_owned()
         }
-        Change::Plan { mode: None, operations } => format!("It plans: {}.", operations.join(", ")),
-        Change::Delivered { by, object, counted } => {
+        TimelineChange::Plan { mode: None, operations } => {
+            format!("It plans: {}.", operations.join(", "))
+        }
+        TimelineChange::Delivered { by, object, counted } => {
             let verb = if *counted { "counts" } else { "does not count" };
             format!("{} delivers {object}, which {verb}.", capitalized(by))
         }
-        Change::Failed { agent, action, reason } => {
+        TimelineChange::Failed { agent, action, reason } => {
             format!("{} fails to {action}: {reason}.", capitalized(agent))
         }
-        Change::Event { event } => format!("{}.", capitalized(event)),
+        TimelineChange::Event { event } => format!("{}.", capitalized(event)),
     }
 }
 
@@ -66,7 +73,7 @@ fn first_belief(goals: &Distribution, people: &Distribution) -> String {
     format!("{start}: {}. The partner may be: {}.", list(goals), list(people))
 }
 
-fn shift_text(Shift { hypothesis, probability, previous }: &Shift) -> String {
+fn shift_text(HypothesisChange { hypothesis, probability, previous }: &HypothesisChange) -> String {
     format!("{} {} (was {})", readable(hypothesis), percent(*probability), percent(*previous))
 }
 

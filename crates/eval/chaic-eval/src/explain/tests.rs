@@ -129,7 +129,7 @@ fn a_reliability_is_no_new_observation() {
 fn events_and_the_end_are_explained() {
     let episode = episode();
     let object = episode.setup().entities().next().unwrap();
-    let label = episode.setup().thing(object).unwrap().class.info().label;
+    let label = episode.setup().object(object).unwrap().class.info().label;
     let action = Action::PickUp { object, hand: Hand::Left };
     let outcome = Outcome::Failure(FailureReason::BeyondLimits);
     let delivered = |by, counted| EventKind::Delivered { object, by, counted };

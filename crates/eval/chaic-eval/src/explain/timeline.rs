@@ -6,14 +6,14 @@ use chaic_env::narration::object_name;
 use chaic_env::trace::{Record, Trace};
 use chaic_world::{EventKind, Setup};
 
-use super::{Change, ModeChange, Shift};
+use super::{HypothesisChange, ModeChange, TimelineChange};
 use crate::recorded_belief::{Distribution, IDENTIFIED_PER_MILLE, most_likely, per_mille_of};
 
 /// Probabilities whose crossing is reported, per mille.
 const THRESHOLDS_PER_MILLE: [u16; 3] = [500, IDENTIFIED_PER_MILLE, 900];
 
 /// Returns the changes with their frames, in chronological order.
-pub(super) fn changes(trace: &Trace, setup: &Setup) -> Vec<(Frame, Change)> {
+pub(super) fn changes(trace: &Trace, setup: &Setup) -> Vec<(Frame, TimelineChange)> {
     let mut reported = Reported::default();
     let mut found = Vec::new();
     for record in &trace.records {
@@ -45,7 +45,7 @@ struct Reported {
 
 impl Reported {
     /// Returns the changes in a new thought.
-    fn changes(&mut self, thought: &Thought) -> Vec<Change> {
+    fn changes(&mut self, thought: &Thought) -> Vec<TimelineChange> {
         let mut found = Vec::new();
         if let Some(belief) = &thought.belief {
             self.add_belief(belief, &mut found);
@@ -54,12 +54,12 @@ impl Reported {
         found
     }
 
-    fn add_belief(&mut self, belief: &PartnerBelief, found: &mut Vec<Change>) {
+    fn add_belief(&mut self, belief: &PartnerBelief, found: &mut Vec<TimelineChange>) {
         let Some(old) = self.belief.replace(belief.clone()) else {
             self.goal.reset(&belief.goals);
             self.person.reset(&belief.people);
             let (goals, people) = (belief.goals.clone(), belief.people.clone());
-            found.push(Change::FirstBelief { goals, people });
+            found.push(TimelineChange::FirstBelief { goals, people });
             return;
         };
         let added = missing_in(&old.evidence, &belief.evidence);
@@ -67,17 +67,17 @@ impl Reported {
         let crosses = self.goal.crosses(&belief.goals);
         if !added.is_empty() || !retracted.is_empty() {
             let goal = self.goal.shift(&belief.goals);
-            found.push(Change::Evidence { added, retracted, goal });
+            found.push(TimelineChange::Evidence { added, retracted, goal });
         } else if crosses {
-            found.extend(self.goal.shift(&belief.goals).map(Change::Goal));
+            found.extend(self.goal.shift(&belief.goals).map(TimelineChange::Goal));
         }
         if self.person.crosses(&belief.people) {
-            found.extend(self.person.shift(&belief.people).map(Change::Person));
+            found.extend(self.person.shift(&belief.people).map(TimelineChange::Person));
         }
     }
 
     /// Returns the change of the mode or of the first operation.
-    fn plan_change(&mut self, thought: &Thought) -> Option<Change> {
+    fn plan_change(&mut self, thought: &Thought) -> Option<TimelineChange> {
         let planned = thought.belief.as_ref().map_or(&[][..], |belief| &belief.plan);
         let current = [thought.plan.clone()];
         let operations = if planned.is_empty() { &current[..] } else { planned };
@@ -94,7 +94,7 @@ impl Reported {
         self.mode.clone_from(&thought.mode);
         self.operation = operation.cloned();
         let operations = operations.iter().filter(|text| !text.is_empty()).cloned().collect();
-        has_changed.then_some(Change::Plan { mode, operations })
+        has_changed.then_some(TimelineChange::Plan { mode, operations })
     }
 }
 
@@ -128,14 +128,14 @@ impl Hypotheses {
 
     /// Returns the most likely hypothesis if its percentage differs from the reported one, and marks
     /// the distribution as reported.
-    fn shift(&mut self, distribution: &Distribution) -> Option<Shift> {
+    fn shift(&mut self, distribution: &Distribution) -> Option<HypothesisChange> {
         let (name, probability) = most_likely(distribution)?;
         let previous = per_mille_of(&self.reported, name);
         self.reported = distribution.to_vec();
         let hypothesis = name.to_owned();
         // Texts have whole percents.
         let percent = |per_mille: u16| (per_mille + 5) / 10;
-        (percent(probability) != percent(previous)).then_some(Shift {
+        (percent(probability) != percent(previous)).then_some(HypothesisChange {
             hypothesis,
             probability,
             previous,
@@ -156,14 +156,18 @@ fn missing_in(old: &[String], new: &[String]) -> Vec<String> {
     new.iter().filter(|text| !old.iter().any(|known| key(known) == key(text))).cloned().collect()
 }
 
-fn event_change(kind: &EventKind, setup: &Setup) -> Option<Change> {
+fn event_change(kind: &EventKind, setup: &Setup) -> Option<TimelineChange> {
     let name = |entity: EntityId| object_name(setup, entity);
     let event = match *kind {
         EventKind::Delivered { object, by, counted } => {
-            return Some(Change::Delivered { by: by.role_name(), object: name(object), counted });
+            return Some(TimelineChange::Delivered {
+                by: by.role_name(),
+                object: name(object),
+                counted,
+            });
         }
         EventKind::Ended { agent, action, outcome: Outcome::Failure(reason) } => {
-            return Some(Change::Failed {
+            return Some(TimelineChange::Failed {
                 agent: agent.role_name(),
                 action: attempt(&action, setup)?,
                 reason: reason.to_string(),
@@ -180,7 +184,7 @@ fn event_change(kind: &EventKind, setup: &Setup) -> Option<Change> {
         EventKind::ChildAway { away: false } => "the child is back".to_owned(),
         _ => return None,
     };
-    Some(Change::Event { event })
+    Some(TimelineChange::Event { event })
 }
 
 /// Describes an action with an object or place; `None` for steps, turns and waits.

@@ -3,7 +3,7 @@
 use super::*;
 use chaic_core::TaskId;
 
-fn bars(helpers: &[&str]) -> Bars {
+fn bars(helpers: &[&str]) -> BarChart {
     let tasks: Vec<String> = TaskId::paper().map(|t| t.info().title.to_owned()).collect();
     let helpers = helpers
         .iter()
@@ -14,15 +14,15 @@ fn bars(helpers: &[&str]) -> Bars {
                 .map(|t| {
                     let mean = ((h * 13 + t * 29) % 60) as f64 / 100.0 + 0.2;
                     let se = 0.02 + t as f64 * 0.005;
-                    Some(Bar { mean, interval: Some([mean - se, mean + 2.0 * se]), dot: None })
+                    Some(BarValue { mean, interval: Some([mean - se, mean + 2.0 * se]), dot: None })
                 })
                 .collect(),
         })
         .collect();
-    Bars { tasks, helpers, dots: None }
+    BarChart { tasks, helpers, dots: None }
 }
 
-fn svg(bars: &Bars) -> String {
+fn svg(bars: &BarChart) -> String {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("figure.svg");
     transport_rate(bars, &path).unwrap();
@@ -60,7 +60,7 @@ fn markup_in_a_name_is_escaped() {
 fn a_missing_value_leaves_a_gap_and_zero_does_not() {
     let mut bars = bars(&["A", "B"]);
     bars.helpers[0].values[3] = None;
-    bars.helpers[1].values[3] = Some(Bar { mean: 0.0, interval: None, dot: None });
+    bars.helpers[1].values[3] = Some(BarValue { mean: 0.0, interval: None, dot: None });
     let svg = svg(&bars);
     assert_eq!(n_fills(&svg, color(0)), 1 + 7);
     assert_eq!(n_fills(&svg, color(1)), 1 + 8);
@@ -73,7 +73,7 @@ fn dots_are_drawn_and_explained() {
     assert_eq!(n_circles(&svg(&bars)), 0);
     bars.dots = Some("the paper".to_owned());
     for (dot, task) in [(0.0, 2), (1.0, 5)] {
-        bars.helpers[1].values[task] = Some(Bar { mean: 0.5, interval: None, dot: Some(dot) });
+        bars.helpers[1].values[task] = Some(BarValue { mean: 0.5, interval: None, dot: Some(dot) });
     }
     let svg = svg(&bars);
     assert_eq!(n_circles(&svg), 2 * 2, "each a disk and its edge");
@@ -113,7 +113,7 @@ fn invalid_rates_are_refused() {
     let out = dir.path().join("figure.svg");
     let with = |mean, interval| {
         let mut bars = bars(&["A"]);
-        bars.helpers[0].values[1] = Some(Bar { mean, interval, dot: None });
+        bars.helpers[0].values[1] = Some(BarValue { mean, interval, dot: None });
         bars
     };
     for bad in [

@@ -16,7 +16,7 @@ pub enum FormulaSet {
 
 /// Statistic that is reported as the spread of the transport rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Spread {
+pub enum SpreadStatistic {
     /// Standard error of the mean over environments, by the cluster bootstrap of
     /// [`Clusters`](crate::metrics::Clusters).
     StandardError,
@@ -32,7 +32,7 @@ pub struct Formulas {
     /// Lower bound of EI's denominator.
     pub ei_floor: f64,
     /// Statistic in `tr_se`.
-    pub spread: Spread,
+    pub spread: SpreadStatistic,
     /// True if CR credits the helper with objects that it took once and the partner delivered.
     pub credits_handovers: bool,
     /// True if ER counts only frames in which the child ran away by its own decision.
@@ -44,7 +44,7 @@ impl Formulas {
     pub const PAPER: Formulas = Formulas {
         ei_on_amounts: false,
         ei_floor: 1e-9,
-        spread: Spread::StandardError,
+        spread: SpreadStatistic::StandardError,
         credits_handovers: false,
         er_counts_escapes: false,
     };
@@ -52,7 +52,7 @@ impl Formulas {
     pub const ORIGINAL: Formulas = Formulas {
         ei_on_amounts: true,
         ei_floor: 1.0,
-        spread: Spread::PopulationDeviation,
+        spread: SpreadStatistic::PopulationDeviation,
         credits_handovers: true,
         er_counts_escapes: true,
     };

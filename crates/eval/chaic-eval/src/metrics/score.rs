@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 /// Maximum number of missing episode runs that are listed; a plan may have millions.
-pub const MAX_NAMED: usize = 20;
+pub const MAX_LISTED_RUNS: usize = 20;
 
 /// Scores of one helper in one task.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -44,7 +44,7 @@ pub struct Score {
     /// True if episode runs are missing.
     #[serde(default)]
     pub incomplete: bool,
-    /// First [`MAX_NAMED`] missing runs, as `EPISODE seed SEED`.
+    /// First [`MAX_LISTED_RUNS`] missing runs, as `EPISODE seed SEED`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub missing: Vec<String>,
 }

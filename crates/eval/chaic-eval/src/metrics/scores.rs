@@ -8,10 +8,10 @@ use chaic_env::helper_registry::NONE;
 use serde::{Deserialize, Serialize};
 
 use crate::metrics::cluster::{Clusters, Environments};
-use crate::metrics::score::{MAX_NAMED, Score};
+use crate::metrics::score::{MAX_LISTED_RUNS, Score};
 use crate::metrics::stats::{mean, population_sd};
 use crate::metrics::table::Metric;
-use crate::metrics::{Formulas, RunResult, Spread, Summary};
+use crate::metrics::{Formulas, RunResult, SpreadStatistic, Summary};
 
 /// Input of the scores.
 #[derive(Clone, Copy, Debug)]
@@ -67,7 +67,7 @@ impl Scores {
                 continue;
             };
             score.incomplete = true;
-            if score.missing.len() < MAX_NAMED {
+            if score.missing.len() < MAX_LISTED_RUNS {
                 score.missing.push(format!("{} seed {}", key.episode, key.seed));
             }
         }
@@ -164,8 +164,8 @@ impl Group<'_> {
         Score {
             tr: mean(&rates).unwrap_or(0.0),
             tr_se: match formulas.spread {
-                Spread::PopulationDeviation => population_sd(&rates),
-                Spread::StandardError => interval.map(|i| i.se),
+                SpreadStatistic::PopulationDeviation => population_sd(&rates),
+                SpreadStatistic::StandardError => interval.map(|i| i.se),
             },
             tr_ci: interval.map(|i| i.clamped(0.0, 1.0)),
             ei: improvement.mean(),

@@ -14,7 +14,7 @@ use crate::metrics::{Delivery, RunResult, RunStatus, Summary};
 
 /// Accumulator of the records of one episode run.
 #[derive(Debug)]
-pub struct Tally {
+pub struct ResultAccumulator {
     key: RunKey,
     has_child: bool,
     /// Objects that partner and helper carried together when they were last carried.
@@ -58,10 +58,10 @@ impl Escape {
     }
 }
 
-impl Tally {
+impl ResultAccumulator {
     /// Creates an accumulator for the trace with this header.
-    pub fn new(header: &Header) -> Tally {
-        Tally {
+    pub fn new(header: &Header) -> ResultAccumulator {
+        ResultAccumulator {
             key: header.key(),
             has_child: header.people.iter().any(|p| p.agent == AgentId::CHILD),
             together: BTreeSet::new(),
@@ -148,8 +148,8 @@ impl Tally {
 }
 
 /// Returns the result of a complete trace; `None` if its end is missing.
-pub fn tally(trace: &Trace) -> Option<RunResult> {
-    let mut tally = Tally::new(&trace.header);
+pub fn result_of_trace(trace: &Trace) -> Option<RunResult> {
+    let mut tally = ResultAccumulator::new(&trace.header);
     trace.records.iter().fold(None, |last, record| tally.add(record).or(last))
 }
 
@@ -187,7 +187,7 @@ mod tests {
             (vec![lifted(partner, child)], (false, false)),
             (vec![lifted(partner, helper), taken(partner)], (false, true)),
         ] {
-            let mut tally = Tally::new(&header());
+            let mut tally = ResultAccumulator::new(&header());
             let delivered = EventKind::Delivered { object, by: partner, counted: true };
             events.iter().for_each(|kind| tally.add_event(kind, 20, None));
             tally.add_event(&delivered, 30, Some(ClassId::named("apple")));
@@ -204,7 +204,7 @@ mod tests {
         with_child.people.push(alone.people[0].clone());
         with_child.people[1].agent = AgentId::CHILD;
         for (header, away, escape) in [(alone, None, None), (with_child, Some(7), Some(0))] {
-            let result = Tally::new(&header).add(&Record::End(end())).unwrap();
+            let result = ResultAccumulator::new(&header).add(&Record::End(end())).unwrap();
             let summary = result.summary().unwrap();
             assert_eq!((summary.away_frames, summary.escape_frames), (away, escape));
             assert_eq!((summary.frames, summary.stuck_frames), (90, Some(5)));

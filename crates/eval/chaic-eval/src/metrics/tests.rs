@@ -372,7 +372,7 @@ fn missing_runs_are_listed_and_mark_their_rows() {
         PlayedEpisodes { results: &results, planned: &planned, environments: &environments };
     let scores = Scores::new(played, &Formulas::PAPER);
     let row = scores.get(TaskId::LowTarget, "rhp").unwrap();
-    assert_eq!((row.incomplete, row.missing.len()), (true, MAX_NAMED));
+    assert_eq!((row.incomplete, row.missing.len()), (true, MAX_LISTED_RUNS));
     assert_eq!(row.missing[0], "e5 seed 0");
     assert!(!scores.get(TaskId::LowTarget, "none").unwrap().incomplete);
     assert!(scores.is_unplayed(TaskId::LowTarget, "oracle"));

@@ -9,7 +9,7 @@ use crate::metrics::{PlayedEpisodes, RunResult};
 use crate::report::labels::title;
 
 /// Number of missing episode runs that a note names.
-const MAX_NAMED: usize = 5;
+const MAX_LISTED_RUNS: usize = 5;
 
 /// Returns notes about missing episode runs and about helpers with different ones; empty for a
 /// complete run.
@@ -25,10 +25,10 @@ fn missing(played: PlayedEpisodes<'_>) -> Option<String> {
     }
     let counts: Vec<String> = by_helper.iter().map(|(h, n)| format!("{} {n}", title(h))).collect();
     let name = |k: &&RunKey| format!("{} with {}, seed {}", k.episode, k.helper, k.seed);
-    let named: Vec<String> = missing.iter().take(MAX_NAMED).map(name).collect();
+    let named: Vec<String> = missing.iter().take(MAX_LISTED_RUNS).map(name).collect();
     (!missing.is_empty()).then(|| {
         let (n, total, counts) = (missing.len(), played.planned.len(), counts.join(", "));
-        let more = if n > MAX_NAMED { "; ..." } else { "" };
+        let more = if n > MAX_LISTED_RUNS { "; ..." } else { "" };
         format!(
             "Unfinished: {n} of {total} episode runs are missing ({counts}); all numbers are of those \
              that were played. Missing: {}{more}.",

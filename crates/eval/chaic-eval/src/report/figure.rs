@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::error::{EvalError, Result};
 use crate::figure::{
-    Bar, Bars, FigureError, HelperBars, MAX_HELPERS, MAX_TASKS, svg_text, transport_rate,
+    BarChart, BarValue, FigureError, HelperBars, MAX_HELPERS, MAX_TASKS, svg_text, transport_rate,
 };
 use crate::metrics::{Score, Scores};
 use crate::report::labels::Labels;
@@ -48,10 +48,10 @@ fn convert_error(error: FigureError) -> EvalError {
     }
 }
 
-fn bars(scores: &Scores, labels: Labels<'_>) -> Bars {
+fn bars(scores: &Scores, labels: Labels<'_>) -> BarChart {
     let tasks = scores.tasks();
     let bars = |helper: &String| {
-        let bar = |s: &Score| Bar { mean: s.tr, interval: drawn_interval(s), dot: None };
+        let bar = |s: &Score| BarValue { mean: s.tr, interval: drawn_interval(s), dot: None };
         let is_incomplete = tasks.iter().any(|t| {
             scores.is_unplayed(*t, helper) || scores.get(*t, helper).is_some_and(|s| s.incomplete)
         });
@@ -61,7 +61,7 @@ fn bars(scores: &Scores, labels: Labels<'_>) -> Bars {
             values: tasks.iter().map(|t| scores.get(*t, helper).map(bar)).collect(),
         }
     };
-    Bars {
+    BarChart {
         tasks: tasks.iter().map(|t| t.info().title.to_owned()).collect(),
         helpers: scores.helpers().iter().map(bars).collect(),
         dots: None,

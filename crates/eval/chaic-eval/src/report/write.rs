@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::error::Result;
 use crate::metrics::{
-    Difference, Environments, FormulaSet, MAX_NAMED, PlayedEpisodes, Resolution, RunResult,
+    Difference, Environments, FormulaSet, MAX_LISTED_RUNS, PlayedEpisodes, Resolution, RunResult,
     RunStatus, Score, Scores, differences, resolution, run_differences,
 };
 use crate::report::Format;
@@ -141,7 +141,7 @@ impl Report<'_> {
             missing: missing.len(),
         });
         let incomplete = !missing.is_empty();
-        missing.truncate(MAX_NAMED);
+        missing.truncate(MAX_LISTED_RUNS);
         let labels = self.labels();
         let helpers = labels.helper_grants(&self.options.helpers);
         let partner = labels.partner_grants();

@@ -7,9 +7,9 @@ use chaic_env::trace::{Trace, TraceWarning};
 use chaic_env::{CHAIC_VERSION, Digest, EnvError, RunKey, slug};
 use chaic_episodes::{Episode, MAX_EPISODE_BYTES, find_episode};
 use chaic_files::{
-    Entry, EntryKind, FolderLock, LOCK, LockError, TEMPORARY_SUFFIX, create_folders, entries,
-    is_file_below, kind, kind_below, open_or_create, read_below, read_bounded, remove_file,
-    remove_folder, walk, write_atomically,
+    DirectoryEntry, EntryKind, FolderLock, LOCK, LockError, TEMPORARY_SUFFIX, create_folders,
+    entries, is_file_below, kind, kind_below, open_or_create, read_below, read_bounded,
+    remove_file, remove_folder, walk, write_atomically,
 };
 use serde::{Deserialize, Serialize};
 
@@ -395,14 +395,14 @@ impl RunFolder {
     /// # Errors
     /// If a folder can't be read.
     pub fn traces(&self) -> Result<Vec<PathBuf>> {
-        let is_trace = |e: &Entry| {
+        let is_trace = |e: &DirectoryEntry| {
             e.kind == EntryKind::File && e.path.extension().is_some_and(|e| e == "jsonl")
         };
         Ok(self.trace_entries()?.into_iter().filter(is_trace).map(|e| e.path).collect())
     }
 
     /// Lists all entries below the folder of the traces.
-    pub(crate) fn trace_entries(&self) -> Result<Vec<Entry>> {
+    pub(crate) fn trace_entries(&self) -> Result<Vec<DirectoryEntry>> {
         Ok(walk(&self.path.join(TRACES), TRACE_DEPTH)?)
     }
 

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use chaic_core::task::Origin;
+use chaic_core::task::TaskOrigin;
 use chaic_core::{Frame, TaskId};
 use chaic_env::{Digest, RunKey, slug};
 use chaic_episodes::{Episode, EpisodeError, Split, SplitError, find_episode};
@@ -60,7 +60,7 @@ pub(super) fn plan(options: &RunOptions, files: &[Episode]) -> Result<Vec<Episod
         let episodes = episodes(options, files, *task, limit)?;
         if episodes.is_empty() {
             let hint = match task.info().origin {
-                Origin::Chaic if options.split != FILES => {
+                TaskOrigin::Chaic if options.split != FILES => {
                     "; use generated ones: give --split gen:0..12"
                 }
                 _ => "",

@@ -261,8 +261,9 @@ fn results_do_not_depend_on_workers_or_interruptions() {
     );
     let traces = run.folder().traces().unwrap();
     assert_eq!(traces.len(), 8);
-    let from_traces =
-        traces.iter().map(|p| crate::metrics::tally(&crate::trace_file::read(p).unwrap().0));
+    let from_traces = traces
+        .iter()
+        .map(|p| crate::metrics::result_of_trace(&crate::trace_file::read(p).unwrap().0));
     assert_eq!(sorted(&from_traces.map(Option::unwrap).collect::<Vec<_>>()), all[0]);
     let report =
         crate::verify::verify_run(run.folder(), run.options(), &helpers, 2, &|_| ()).unwrap();

@@ -12,7 +12,7 @@ use chaic_env::trace::Record;
 use chaic_env::{Env, EpisodeAgents, EpisodeConfig, RunKey};
 
 use crate::error::{EvalError, Result};
-use crate::metrics::{RunResult, RunStatus, Tally};
+use crate::metrics::{ResultAccumulator, RunResult, RunStatus};
 use crate::run::estimate::Estimate;
 use crate::run::folder::RunFolder;
 use crate::run::options::RunOptions;
@@ -243,7 +243,7 @@ impl WorkerPool<'_> {
             let path = self.folder.trace(key);
             *writer = Some(TraceWriter::create(self.folder.path(), &path, env.header())?);
         }
-        let mut tally = Tally::new(env.header());
+        let mut tally = ResultAccumulator::new(env.header());
         let (mut result, mut decisions) = (None, 0);
         env.run(self.stop, None, &mut |record| -> Result<()> {
             if let Some(writer) = writer.as_mut() {

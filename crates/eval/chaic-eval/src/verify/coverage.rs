@@ -92,7 +92,7 @@ impl ReportState {
     }
 
     /// Returns whether the report was compared and has no differences.
-    pub fn is_good(&self) -> bool {
+    pub fn has_passed(&self) -> bool {
         matches!(self, ReportState::Compared { missing, altered } if missing.is_empty() && altered.is_empty())
     }
 }

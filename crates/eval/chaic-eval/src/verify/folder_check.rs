@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use chaic_env::helper_registry::NONE;
 use chaic_env::{CHAIC_VERSION, RunKey};
-use chaic_files::{Entry, EntryKind, walk};
+use chaic_files::{DirectoryEntry, EntryKind, walk};
 
 use super::{Mismatch, finished};
 use crate::error::Result;
@@ -86,7 +86,7 @@ impl FolderCheck<'_> {
         }
         let planned: BTreeMap<PathBuf, &RunKey> =
             self.planned.iter().map(|key| (self.folder.trace(key), key)).collect();
-        for Entry { path, kind } in self.folder.trace_entries()? {
+        for DirectoryEntry { path, kind } in self.folder.trace_entries()? {
             let key = planned.get(&path);
             let has_name = path.extension().is_some_and(|e| e == "jsonl");
             let problem = match kind {
@@ -112,7 +112,7 @@ impl FolderCheck<'_> {
     /// after their episodes.
     fn check_episodes(&self, contents: &mut FolderContents) -> Result<()> {
         let has_files = self.options.split == FILES;
-        for Entry { path, kind } in walk(&self.folder.episode_files(), 0)? {
+        for DirectoryEntry { path, kind } in walk(&self.folder.episode_files(), 0)? {
             let problem = match kind {
                 _ if !has_files => {
                     format!(

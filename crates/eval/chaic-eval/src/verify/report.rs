@@ -26,7 +26,7 @@ pub struct VerificationReport {
 
 impl VerificationReport {
     /// Returns whether every episode run was played to its end, and every check was made and passed.
-    pub fn is_good(&self) -> bool {
+    pub fn has_passed(&self) -> bool {
         self.is_consistent() && self.coverage.failed.is_empty()
     }
 
@@ -37,6 +37,6 @@ impl VerificationReport {
             && self.findings.is_empty()
             && self.warnings.is_empty()
             && self.coverage.missing.is_empty()
-            && self.report.is_good()
+            && self.report.has_passed()
     }
 }

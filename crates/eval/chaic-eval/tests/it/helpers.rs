@@ -9,7 +9,7 @@ use chaic_core::{AgentError, AgentId, TaskId};
 use chaic_env::helper_registry::{BuiltInHelpers, HelperRegistry as _};
 use chaic_env::{AdvanceOutcome, Env, EpisodeConfig};
 use chaic_episodes::{Episode, Split, episodes};
-use chaic_eval::metrics::{Summary, Tally};
+use chaic_eval::metrics::{ResultAccumulator, Summary};
 
 /// Side of all agents' images, pixels: enough for navigation.
 const SIDE_PX: u32 = 128;
@@ -38,7 +38,7 @@ fn episodes_of(task: TaskId) -> impl Iterator<Item = Episode> {
 /// Returns whether the helper delivered a part of the goal, alone or together with the partner.
 fn helper_delivers(episode: &Episode, helper: &str) -> bool {
     let mut env = start(episode, helper);
-    let mut tally = Tally::new(env.header());
+    let mut tally = ResultAccumulator::new(env.header());
     let mut summary: Option<Summary> = None;
     let mut sink = |record: &_| {
         summary = tally.add(record).and_then(|r| r.summary().cloned()).or(summary.take());

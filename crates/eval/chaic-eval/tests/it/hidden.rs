@@ -5,7 +5,7 @@
 use std::sync::{Arc, Mutex};
 
 use chaic_agents::PlannerRules;
-use chaic_core::observation::{Granted, Grants, SensorConfig};
+use chaic_core::observation::{GrantedInfo, Grants, SensorConfig};
 use chaic_core::{Action, Agent, AgentError, Briefing, Observation, TaskId};
 use chaic_env::helper_registry::{BuiltInHelpers, Helper, HelperRegistry as _};
 use chaic_env::rules::RuleSet;
@@ -161,7 +161,7 @@ fn checked(
 fn without_grants_an_observation_has_images_and_proprioception_only() {
     let [n, ..] = checked(TaskId::NoConstraint, "random", Grants::NONE, |o, counts| {
         assert!(o.images.ids.is_none() && o.images.rgb.is_some() && o.images.depth_m.is_some());
-        assert_eq!(o.granted, Granted::default());
+        assert_eq!(o.granted, GrantedInfo::default());
         assert!(o.proprioception.held().all(|held| held.identity.is_none()));
         counts.lock().unwrap()[0] += 1;
     });

@@ -8,7 +8,7 @@ use chaic_core::geom::math;
 use chaic_core::observation::{Grants, SensorConfig};
 use chaic_core::task::SceneKind;
 use chaic_episodes::{Split, episodes};
-use chaic_eval::audit::opening::{Opening, distinct, predict, varying_fields};
+use chaic_eval::audit::opening::{InitialInformation, distinct, predict, varying_fields};
 
 /// Fields of a briefing that may differ between episodes of one scene kind, with the reason.
 const MAY_VARY: [(&str, &str); 1] =
@@ -21,18 +21,23 @@ const LEAK_Z: f64 = 4.0;
 const SCENES: [SceneKind; 3] = [SceneKind::House, SceneKind::Street, SceneKind::Yard];
 
 /// Returns openings of the first episodes of each task, by scene kind.
-fn openings(split: &Split, first: usize, grants: Grants) -> Vec<(SceneKind, Vec<Opening>)> {
+fn openings(
+    split: &Split,
+    first: usize,
+    grants: Grants,
+) -> Vec<(SceneKind, Vec<InitialInformation>)> {
     let scene_openings = |scene: SceneKind| {
         let tasks = TaskId::paper().filter(|task| task.info().scene == scene);
         let all = tasks.flat_map(|task| episodes(split, task).take(first));
-        let opening = |episode| Opening::new(&episode, grants, SensorConfig::NONE).unwrap();
+        let opening =
+            |episode| InitialInformation::new(&episode, grants, SensorConfig::NONE).unwrap();
         (scene, all.map(|episode| opening(episode.unwrap())).collect())
     };
     SCENES.map(scene_openings).into()
 }
 
 /// Returns the varying fields that are not in [`MAY_VARY`].
-fn unexpected(openings: &[&Opening]) -> Vec<String> {
+fn unexpected(openings: &[&InitialInformation]) -> Vec<String> {
     let may_vary = |field: &str| {
         let is_below =
             |name: &str| field.strip_prefix(name).is_some_and(|suffix| suffix.starts_with('.'));
@@ -53,7 +58,7 @@ fn a_briefing_differs_between_episodes_of_one_scene_kind_in_listed_fields_only()
     for (split, grants) in cases {
         let mut seeds = BTreeSet::new();
         for (scene, all) in openings(&split, 6, grants) {
-            let all: Vec<&Opening> = all.iter().collect();
+            let all: Vec<&InitialInformation> = all.iter().collect();
             assert!(all.len() >= 6, "{split}, {scene:?}");
             assert_eq!(unexpected(&all), Vec::<String>::new(), "{split}, {scene:?}");
             seeds.extend(all.iter().map(|o| o.briefing["seed"].clone()));
@@ -77,13 +82,13 @@ fn tasks_of_one_house_share_its_bounds() {
 fn a_start_pose_predicts_neither_task_nor_partner() {
     for split in [Split::Generated(700_000..700_060), Split::GeneratedStandard(700_000..700_060)] {
         let (_, all) = openings(&split, usize::MAX, Grants::NONE).remove(0);
-        let all: Vec<&Opening> = all.iter().collect();
+        let all: Vec<&InitialInformation> = all.iter().collect();
         assert_eq!(
             distinct(&all, |o| o.proprioception.clone()),
             all.len(),
             "poses differ, so there is something to find"
         );
-        let labels: [fn(&Opening) -> String; 2] =
+        let labels: [fn(&InitialInformation) -> String; 2] =
             [|o| o.task.to_string(), |o| o.partner.to_string()];
         for label in labels {
             let found = predict(&all, label);

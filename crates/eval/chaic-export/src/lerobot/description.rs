@@ -4,7 +4,7 @@ use chaic_env::trace::Header;
 
 use super::{ACTION, EpisodeEntry, KINDS, LeRobotWriter, STATE};
 use crate::card::{
-    DataType, DatasetDescription, Field, FileGroup, LICENSE, Place, RecordSet, common,
+    DataType, DatasetDescription, Field, FileGroup, LICENSE, RecordSet, ValueLocation, common,
 };
 
 /// Source of the decisions of an episode.
@@ -176,7 +176,7 @@ fn frame_fields() -> Vec<Field> {
         data_type,
         is_list: false,
         description: description.to_owned(),
-        place: Place::Column(name),
+        place: ValueLocation::Column(name),
     };
     let list = |name, description: String| Field {
         is_list: true,

@@ -9,7 +9,7 @@ use chaic_files::{create_folders, write_atomically};
 use super::{CheckedTrace, description};
 use crate::data::TrialEnd;
 use crate::error::Result;
-use crate::forms::Form;
+use crate::forms::Questionnaire;
 use crate::plan::{StudyPlan, Trial, short_digest};
 
 /// Columns of the rows of all tables.
@@ -163,7 +163,8 @@ impl Tables {
             let cells = [name.to_owned(), item.id.clone(), rating];
             self.answers.push_str(&line(common.iter().cloned().chain(cells).collect()));
         }
-        let score = Form::score(&form, ratings).map_or(String::new(), |score| score.to_string());
+        let score =
+            Questionnaire::score(&form, ratings).map_or(String::new(), |score| score.to_string());
         self.scores.push_str(&line(common.into_iter().chain([name.to_owned(), score]).collect()));
     }
 

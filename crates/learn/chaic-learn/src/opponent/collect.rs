@@ -32,8 +32,8 @@ use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
 use serde::{Deserialize, Serialize};
 
 use super::episode_agents::EpisodeAgentKinds;
-use super::window::{N_CLASS, N_STATE, ObservationHistory};
-use super::{N_LIMITS, OpponentGoal, is_pickable, limits};
+use super::window::{N_CLASS_FEATURES, N_STATE_FEATURES, ObservationHistory};
+use super::{N_BODY_LIMITS, OpponentGoal, is_pickable, limits};
 use crate::candidate_scorer::CandidateSet;
 use crate::rollout::RolloutError;
 
@@ -47,7 +47,7 @@ pub struct LabeledWindow {
     /// Index of the class that the partner wants to pick up, if that is its goal.
     pub target: Option<usize>,
     /// Physical limits of the partner.
-    pub limits: [f32; N_LIMITS],
+    pub limits: [f32; N_BODY_LIMITS],
     /// Index of the episode in the collection.
     pub episode: u32,
 }
@@ -127,7 +127,7 @@ impl WindowCollectionConfig {
         let n_per_goal = self.max_per_class.min(self.episodes.saturating_mul(MAX_PER_EPISODE));
         let n = OpponentGoal::ALL.len().saturating_mul(n_per_goal) as u64;
         let n_classes = ClassId::all().filter(|class| is_pickable(*class)).count();
-        let n_features = N_STATE + n_classes * N_CLASS;
+        let n_features = N_STATE_FEATURES + n_classes * N_CLASS_FEATURES;
         let window_bytes = size_of::<LabeledWindow>() + n_features * size_of::<f32>();
         let bytes = n.saturating_mul(window_bytes as u64);
         if bytes <= MAX_WINDOW_BYTES {
@@ -338,7 +338,7 @@ impl Policy for PlanReporter {
 /// Ground truth about the partner.
 struct GroundTruth {
     partner_plan: Arc<Mutex<Option<ReportedPlan>>>,
-    limits: [f32; N_LIMITS],
+    limits: [f32; N_BODY_LIMITS],
     episode: u32,
 }
 
@@ -437,7 +437,7 @@ pub fn write(path: &Path, samples: &[LabeledWindow], is_granted: bool) -> Result
     let n_candidates: usize = samples.iter().map(|s| s.window.n_candidates).sum();
     let target = |s: &LabeledWindow| s.target.map_or(-1, |k| k as i32);
     let tensors = [
-        ("choices", Dtype::F32, vec![n_candidates, N_CLASS], {
+        ("choices", Dtype::F32, vec![n_candidates, N_CLASS_FEATURES], {
             f32_bytes(&mut samples.iter().flat_map(|s| s.window.candidates.iter().copied()))
         }),
         ("episode", Dtype::I32, vec![n], i32_bytes(&mut samples.iter().map(|s| s.episode as i32))),
@@ -447,13 +447,13 @@ pub fn write(path: &Path, samples: &[LabeledWindow], is_granted: bool) -> Result
             vec![n],
             i32_bytes(&mut samples.iter().map(|s| s.goal.index() as i32)),
         ),
-        ("limits", Dtype::F32, vec![n, N_LIMITS], {
+        ("limits", Dtype::F32, vec![n, N_BODY_LIMITS], {
             f32_bytes(&mut samples.iter().flat_map(|s| s.limits))
         }),
         ("n_choices", Dtype::I32, vec![n], {
             i32_bytes(&mut samples.iter().map(|s| s.window.n_candidates as i32))
         }),
-        ("state", Dtype::F32, vec![n, N_STATE], {
+        ("state", Dtype::F32, vec![n, N_STATE_FEATURES], {
             f32_bytes(&mut samples.iter().flat_map(|s| s.window.state.iter().copied()))
         }),
         ("target", Dtype::I32, vec![n], i32_bytes(&mut samples.iter().map(target))),
@@ -553,21 +553,24 @@ fn parse(bytes: &[u8]) -> Result<Vec<LabeledWindow>, String> {
     let i32s = |name| -> Result<Vec<i32>, String> {
         Ok(tensor(name, Dtype::I32, 1)?.into_iter().map(i32::from_le_bytes).collect())
     };
-    let (state, candidates) = (f32s("state", N_STATE)?, f32s("choices", N_CLASS)?);
-    let limits = f32s("limits", N_LIMITS)?;
+    let (state, candidates) =
+        (f32s("state", N_STATE_FEATURES)?, f32s("choices", N_CLASS_FEATURES)?);
+    let limits = f32s("limits", N_BODY_LIMITS)?;
     if !state.iter().chain(&candidates).chain(&limits).all(|x| x.is_finite()) {
         return Err("a value is not finite".to_owned());
     }
     let [n_candidates, goals] = [i32s("n_choices")?, i32s("goal")?];
     let [targets, episodes] = [i32s("target")?, i32s("episode")?];
     let n = n_candidates.len();
-    let lengths = [state.len() / N_STATE, limits.len() / N_LIMITS];
+    let lengths = [state.len() / N_STATE_FEATURES, limits.len() / N_BODY_LIMITS];
     let all_lengths = lengths.into_iter().chain([goals.len(), targets.len(), episodes.len()]);
     let total: i64 = n_candidates.iter().map(|n| i64::from(*n).max(0)).sum();
-    if all_lengths.into_iter().any(|len| len != n) || total != (candidates.len() / N_CLASS) as i64 {
+    if all_lengths.into_iter().any(|len| len != n)
+        || total != (candidates.len() / N_CLASS_FEATURES) as i64
+    {
         return Err("its tensors have different lengths".to_owned());
     }
-    let mut candidates = candidates.chunks_exact(N_CLASS);
+    let mut candidates = candidates.chunks_exact(N_CLASS_FEATURES);
     (0..n)
         .map(|k| {
             let n_candidates = n_candidates[k].max(0) as usize;
@@ -577,11 +580,11 @@ fn parse(bytes: &[u8]) -> Result<Vec<LabeledWindow>, String> {
             if target.is_some_and(|t| t >= n_candidates) {
                 return Err(format!("target {} of window {k} is not a candidate", targets[k]));
             }
-            let mut window_limits = [0.0; N_LIMITS];
-            window_limits.copy_from_slice(&limits[k * N_LIMITS..][..N_LIMITS]);
+            let mut window_limits = [0.0; N_BODY_LIMITS];
+            window_limits.copy_from_slice(&limits[k * N_BODY_LIMITS..][..N_BODY_LIMITS]);
             Ok(LabeledWindow {
                 window: CandidateSet {
-                    state: state[k * N_STATE..][..N_STATE].to_vec(),
+                    state: state[k * N_STATE_FEATURES..][..N_STATE_FEATURES].to_vec(),
                     candidates: candidates.by_ref().take(n_candidates).flatten().copied().collect(),
                     n_candidates,
                     memory: Vec::new(),

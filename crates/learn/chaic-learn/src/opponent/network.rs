@@ -3,11 +3,11 @@
 use chaic_agents::perception_factory::PerceptionFactory;
 use chaic_core::geom::math;
 use chaic_core::observation::Grants;
-use chaic_nn::Pass;
+use chaic_nn::TrainingPass;
 use chaic_nn::weights::{self, WeightsError};
 
-use super::window::{N_CLASS, N_STATE};
-use super::{N_LIMITS, OpponentGoal};
+use super::window::{N_CLASS_FEATURES, N_STATE_FEATURES};
+use super::{N_BODY_LIMITS, OpponentGoal};
 use crate::actor_critic::{ActorCritic as _, ActorCriticOutput, log_softmax};
 use crate::candidate_scorer::{CandidateScorer, CandidateSet};
 
@@ -24,7 +24,7 @@ const WIDTH: usize = 96;
 /// Creates the network architecture. Candidates are the classes that the partner may want to pick
 /// up.
 pub fn network() -> CandidateScorer {
-    CandidateScorer::new(N_STATE, N_CLASS, WIDTH, N_GOALS + N_LIMITS)
+    CandidateScorer::new(N_STATE_FEATURES, N_CLASS_FEATURES, WIDTH, N_GOALS + N_BODY_LIMITS)
 }
 
 /// Opponent model whose predictions a policy reads.
@@ -71,7 +71,7 @@ pub struct OpponentPrediction {
     /// up.
     pub targets: Vec<f32>,
     /// Physical limits, as [`limits`](super::limits) defines them.
-    pub limits: [f32; N_LIMITS],
+    pub limits: [f32; N_BODY_LIMITS],
 }
 
 /// Decoded outputs of the state head.
@@ -79,13 +79,13 @@ pub(crate) struct Heads {
     /// Log-probability of each goal.
     pub log_goals: Vec<f32>,
     /// Limits, between 0 and 1.
-    pub limits: [f32; N_LIMITS],
+    pub limits: [f32; N_BODY_LIMITS],
 }
 
 impl Heads {
     pub(crate) fn new(output: &ActorCriticOutput) -> Heads {
         let (goals, limits) = output.values.split_at(N_GOALS);
-        let mut limit_values = [0.0; N_LIMITS];
+        let mut limit_values = [0.0; N_BODY_LIMITS];
         for (value, x) in limit_values.iter_mut().zip(limits) {
             *value = 1.0 / (1.0 + math::exp(-x));
         }
@@ -152,12 +152,12 @@ impl OpponentModel {
     }
 
     /// Creates the buffers of a pass.
-    pub fn pass(&self) -> Pass {
+    pub fn pass(&self) -> TrainingPass {
         self.network.pass()
     }
 
     /// Predicts goal, target and limits of the partner.
-    pub fn predict(&self, window: &CandidateSet, pass: &mut Pass) -> OpponentPrediction {
+    pub fn predict(&self, window: &CandidateSet, pass: &mut TrainingPass) -> OpponentPrediction {
         let windows = std::iter::once(window);
         let output = self.network.forward(&self.parameters, windows, pass).remove(0);
         let Heads { log_goals, limits } = Heads::new(&output);

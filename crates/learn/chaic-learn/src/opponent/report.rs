@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::collect::LabeledWindow;
 use super::network::{N_GOALS, OpponentModel};
-use super::{LIMITS, N_LIMITS, OpponentGoal};
+use super::{LIMITS, N_BODY_LIMITS, OpponentGoal};
 
 /// Mean with its uncertainty.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -53,7 +53,7 @@ impl OpponentReport {
         let mut pass = model.pass();
         let mut confusion = [[0; N_GOALS]; N_GOALS];
         let (mut goals, mut targets, mut errors) = (Vec::new(), Vec::new(), Vec::new());
-        let mut limit_errors = [0.0; N_LIMITS];
+        let mut limit_errors = [0.0; N_BODY_LIMITS];
         let mut bins = [(0.0, 0.0, 0.0); N_BINS];
         for sample in samples {
             if stop.load(Ordering::Relaxed) {
@@ -78,7 +78,7 @@ impl OpponentReport {
             {
                 let square = f64::from((predicted_limit - truth) * (predicted_limit - truth));
                 limit_errors[k] += square / samples.len() as f64;
-                sum += square / N_LIMITS as f64;
+                sum += square / N_BODY_LIMITS as f64;
             }
             errors.push((sample.episode, sum));
         }

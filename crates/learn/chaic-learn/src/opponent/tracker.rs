@@ -5,7 +5,7 @@ use std::sync::Arc;
 use chaic_agents::behavior::BehaviorLog;
 use chaic_agents::memory::Memory;
 use chaic_core::{Briefing, ClassId};
-use chaic_nn::Pass;
+use chaic_nn::TrainingPass;
 
 use super::network::{OpponentModel, OpponentPrediction};
 use super::window::ObservationHistory;
@@ -14,7 +14,7 @@ use super::window::ObservationHistory;
 #[derive(Clone)]
 pub struct OpponentTracker {
     model: Arc<OpponentModel>,
-    pass: Pass,
+    pass: TrainingPass,
     history: ObservationHistory,
 }
 

@@ -24,7 +24,7 @@ use super::collect::{
 };
 use super::network::{Heads, N_GOALS, OpponentModel, kind as model_kind, network};
 use super::report::OpponentReport;
-use super::{N_LIMITS, OpponentGoal};
+use super::{N_BODY_LIMITS, OpponentGoal};
 use crate::actor_critic::{ActorCriticOutput, Optimizer, OutputGrad, optimizer_step};
 use crate::candidate_scorer::CandidateScorer;
 use crate::ppo::MAX_BATCH;
@@ -415,7 +415,7 @@ fn gradient(
     let mut values: Vec<f32> =
         (0..N_GOALS).map(|k| weight * (math::exp(log_goals[k]) - one_hot(k, goal))).collect();
     stats.goal -= f64::from(log_goals[goal]);
-    let fraction = 1.0 / N_LIMITS as f32;
+    let fraction = 1.0 / N_BODY_LIMITS as f32;
     for (predicted, truth) in limits.iter().zip(&sample.limits) {
         let error = predicted - truth;
         stats.limits += f64::from(fraction * error * error);

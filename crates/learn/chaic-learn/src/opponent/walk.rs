@@ -92,7 +92,7 @@ impl PartnerWalk {
     }
 
     /// Returns the time for which the partner has stood at one position when last seen, frames.
-    pub fn still_frames(&self) -> Frame {
+    pub fn standing_frames(&self) -> Frame {
         self.last_seen.saturating_sub(self.stop.1)
     }
 
@@ -187,7 +187,7 @@ fn cell_beside(costs: &CostMap, object: &MappedObject) -> Option<usize> {
     let at = to_xz(object.position_in_world);
     let grid = costs.grid();
     BESIDE_M.into_iter().find_map(|radius_m| {
-        let roomy = grid.disc(at, radius_m).filter(|cell| !costs.is_tight(*cell));
+        let roomy = grid.disc(at, radius_m).filter(|cell| !costs.touches_obstacle(*cell));
         roomy.min_by(|a, b| grid.center(*a).distance(at).total_cmp(&grid.center(*b).distance(at)))
     })
 }

@@ -127,7 +127,7 @@ impl<'a> WalkFeatures<'a> {
         [
             normalize_clamped(behavior.partner_holds.len() as f32, LOAD_SCALE),
             self.paths.map_or(0.0, |paths| normalize_clamped(paths.walked_m, NEAR_SCALE_M)),
-            normalize_clamped(self.walk.still_frames() as f32, STILL_SCALE_FRAMES),
+            normalize_clamped(self.walk.standing_frames() as f32, STILL_SCALE_FRAMES),
             path,
             detour,
             progress,

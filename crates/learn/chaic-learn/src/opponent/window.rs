@@ -97,9 +97,10 @@ pub const CLASS_FEATURES: [&str; 23] = [
 ];
 
 /// Number of state features.
-pub const N_STATE: usize = STATE_FEATURES.len() + WALK_STATE_FEATURES.len();
+pub const N_STATE_FEATURES: usize = STATE_FEATURES.len() + WALK_STATE_FEATURES.len();
 /// Number of class features.
-pub const N_CLASS: usize = CLASS_FEATURES.len() + TARGET_SETS.len() + WALK_CLASS_FEATURES.len();
+pub const N_CLASS_FEATURES: usize =
+    CLASS_FEATURES.len() + TARGET_SETS.len() + WALK_CLASS_FEATURES.len();
 
 /// Height at which features of height saturate, meters.
 const HEIGHT_SCALE_M: f32 = 2.0;
@@ -213,7 +214,7 @@ impl ObservationHistory {
         let belief = self.belief.as_ref();
         let walk = WalkFeatures::new(&self.walk, paths.as_ref(), belief, &self.classes, memory);
         state.extend(walk.state(memory, briefing, behavior));
-        let mut candidates = Vec::with_capacity(self.classes.len() * N_CLASS);
+        let mut candidates = Vec::with_capacity(self.classes.len() * N_CLASS_FEATURES);
         for k in 0..self.classes.len() {
             let features = self.class_features(k, &path, &actions, nearest_class, memory, behavior);
             candidates.extend(features);

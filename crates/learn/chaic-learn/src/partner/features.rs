@@ -71,14 +71,14 @@ pub const PARTNER_PLAN_FEATURES: [&str; 20] = [
     "age",
 ];
 /// Number of state features.
-pub const N_PARTNER_STATE: usize = PARTNER_STATE_FEATURES.len() + N_KINDS;
+pub const N_PARTNER_STATE_FEATURES: usize = PARTNER_STATE_FEATURES.len() + N_KINDS;
 /// Number of plan features.
-pub const N_PARTNER_PLAN: usize = N_KINDS + PARTNER_PLAN_FEATURES.len();
+pub const N_PARTNER_PLAN_FEATURES: usize = N_KINDS + PARTNER_PLAN_FEATURES.len();
 
 /// Returns the index of the nearest wanted target among the candidates, if there is one.
 pub fn nearest_wanted(observation: &CandidateSet) -> Option<usize> {
     let feature = PARTNER_PLAN_FEATURES.iter().position(|name| *name == "is_nearest_wanted")?;
-    let rows = observation.candidates.chunks_exact(N_PARTNER_PLAN);
+    let rows = observation.candidates.chunks_exact(N_PARTNER_PLAN_FEATURES);
     rows.map(|row| row[N_KINDS + feature]).position(|flag| flag > 0.0)
 }
 
@@ -137,7 +137,7 @@ impl PartnerEncoder {
         let choice = ChoiceContext::new(context, self);
         let wanted: Vec<&Plan> = candidates.iter().filter(|plan| choice.is_wanted(plan)).collect();
         let mut has_kind = [false; N_KINDS];
-        let mut features = Vec::with_capacity(candidates.len() * N_PARTNER_PLAN);
+        let mut features = Vec::with_capacity(candidates.len() * N_PARTNER_PLAN_FEATURES);
         for plan in candidates {
             let is_first = !std::mem::replace(&mut has_kind[plan.kind()], true);
             let rank = wanted.iter().position(|other| *other == plan);

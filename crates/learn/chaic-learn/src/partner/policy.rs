@@ -7,10 +7,10 @@ use chaic_agents::{PlannerRules, PlanningAgent, partner_grants};
 use chaic_core::rng::RngStream;
 use chaic_core::{AgentError, Briefing};
 use chaic_env::helper_registry::Helper;
-use chaic_nn::Pass;
+use chaic_nn::TrainingPass;
 use chaic_nn::weights::{self, WeightsError};
 
-use super::features::{N_PARTNER_PLAN, N_PARTNER_STATE, PartnerEncoder};
+use super::features::{N_PARTNER_PLAN_FEATURES, N_PARTNER_STATE_FEATURES, PartnerEncoder};
 use crate::actor_critic::ActorCritic as _;
 use crate::candidate_scorer::{CandidateScorer, CandidateSet};
 use crate::policy::ActionSelection;
@@ -22,7 +22,7 @@ const WIDTH: usize = 48;
 
 /// Returns the network architecture of a partner's policy.
 pub fn partner_network() -> CandidateScorer {
-    CandidateScorer::new(N_PARTNER_STATE, N_PARTNER_PLAN, WIDTH, 1)
+    CandidateScorer::new(N_PARTNER_STATE_FEATURES, N_PARTNER_PLAN_FEATURES, WIDTH, 1)
 }
 
 /// Network of a partner's policy with parameter values.
@@ -60,7 +60,7 @@ impl PartnerWeights {
 pub struct LearnedPartnerPolicy {
     weights: Arc<PartnerWeights>,
     selection: ActionSelection,
-    pass: Pass,
+    pass: TrainingPass,
     rng: RngStream,
     encoder: PartnerEncoder,
 }

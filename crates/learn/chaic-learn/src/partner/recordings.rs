@@ -16,7 +16,7 @@ const EXTENSION: &str = "jsonl";
 
 /// Reason why recordings cannot be read.
 #[derive(Debug, thiserror::Error)]
-pub enum ReadError {
+pub enum RecordingReadError {
     /// A file cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
@@ -31,16 +31,16 @@ pub enum ReadError {
 /// # Errors
 /// If the path is missing, a trace is damaged, the only trace is no recording of a partner, or a folder has
 /// none or too many.
-pub fn read_recordings(path: &Path) -> Result<Recordings, ReadError> {
+pub fn read_recordings(path: &Path) -> Result<Recordings, RecordingReadError> {
     // One byte more than the limit distinguishes a file at the limit from a longer one.
     let limit = MAX_TRACE_BYTES + 1;
     if !path.is_dir() {
         let file = read_user_file(path, limit).map(|bytes| (path.to_owned(), bytes));
-        return Recordings::collect(path, std::iter::once(file.map_err(ReadError::from)));
+        return Recordings::collect(path, std::iter::once(file.map_err(RecordingReadError::from)));
     }
     let is_trace = |path: &PathBuf| path.extension().is_some_and(|e| e == EXTENSION);
     let files = walk(path, MAX_DEPTH)?.into_iter().filter(|entry| entry.kind == EntryKind::File);
     let files = files.map(|entry| entry.path).filter(is_trace);
     let read = |path: PathBuf| read_bounded(&path, limit).map(|bytes| (path, bytes));
-    Recordings::collect(path, files.map(|path| read(path).map_err(ReadError::from)))
+    Recordings::collect(path, files.map(|path| read(path).map_err(RecordingReadError::from)))
 }

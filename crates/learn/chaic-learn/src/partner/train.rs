@@ -25,7 +25,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::demonstrator::{DemonstrationEpisode, Demonstrator, PartnerDecision};
-use super::features::{N_PARTNER_PLAN, N_PARTNER_STATE, nearest_wanted};
+use super::features::{N_PARTNER_PLAN_FEATURES, N_PARTNER_STATE_FEATURES, nearest_wanted};
 use super::policy::{PARTNER_KIND, partner_network};
 use super::recordings::read_recordings;
 use crate::actor_critic::{ActorCritic as _, Optimizer};
@@ -235,7 +235,7 @@ impl PartnerCloningTrainer {
     }
 
     fn read_data(&self) -> Result<Demonstrations, String> {
-        let n_features = (N_PARTNER_STATE, N_PARTNER_PLAN);
+        let n_features = (N_PARTNER_STATE_FEATURES, N_PARTNER_PLAN_FEATURES);
         let max_episodes = self.config.max_episodes;
         let identity = self.identity();
         Demonstrations::read(&self.folder, self.iterations, max_episodes, &identity, n_features)

@@ -12,7 +12,7 @@ use chaic_env::{
     AdvanceOutcome, AgentSlot, Env, EpisodeAgents, EpisodeConfig, RewardTerms, RewardWeights,
 };
 use chaic_episodes::find_episode;
-use chaic_nn::Pass;
+use chaic_nn::TrainingPass;
 use rayon::prelude::*;
 
 use super::actions::ActionSpace;
@@ -43,7 +43,7 @@ pub(super) struct EnvRunner {
     actions: Vec<u16>,
     /// Current observation.
     observation: VisualObservation,
-    pass: Pass,
+    pass: TrainingPass,
 }
 
 /// Outcome of a decision.
@@ -58,7 +58,7 @@ impl EnvRunner {
         setup: &TrainingSetup,
         slot: usize,
         n_started: u64,
-        pass: Pass,
+        pass: TrainingPass,
     ) -> Result<EnvRunner, RolloutError> {
         let TrainingSetup { config, perception, opponent, .. } = setup;
         let id = config.episode(slot, n_started);
@@ -104,7 +104,7 @@ impl EnvRunner {
             if let Some(terms) = self.env.reward(AgentId::HELPER) {
                 let is_invalid = terms.is_invalid || is_first && is_invalid;
                 outcome.is_invalid |= is_invalid;
-                outcome.reward += RewardTerms { is_invalid, ..terms }.weigh(rewards) as f32;
+                outcome.reward += RewardTerms { is_invalid, ..terms }.weighted_sum(rewards) as f32;
             }
             is_first = false;
             if outcome.has_ended {

@@ -10,7 +10,7 @@ use chaic_core::observation::{Grants, SensorConfig};
 use chaic_core::rng::RngStream;
 use chaic_core::{Action, Agent, AgentError, AgentId, Briefing, Observation, TaskId};
 use chaic_env::helper_registry::Helper;
-use chaic_nn::Pass;
+use chaic_nn::TrainingPass;
 use chaic_nn::weights::{self, WeightsError};
 
 use super::actions::{
@@ -270,7 +270,7 @@ pub struct VisualHelper {
 /// Policy of the current episode.
 struct CurrentPolicy {
     weights: Arc<VisualWeights>,
-    pass: Pass,
+    pass: TrainingPass,
 }
 
 impl VisualHelper {

@@ -5,11 +5,12 @@ use std::ops::Range;
 
 use chaic_nn::simd::widest;
 use chaic_nn::weights::{self, WeightsError};
-use chaic_nn::{Kernel, Network, Node, Pass, Shape, Tensor};
+use chaic_nn::{Kernel, Network, NodeId, Shape, Tensor, TrainingPass};
 
 use super::actions::{ActionSpace, classes};
 use super::observation::{
-    IMAGE_CHANNELS, IMAGE_SIZE, MAP, MAP_CHANNELS, N_OPPONENT, N_STATE, VisualObservation,
+    IMAGE_CHANNELS, IMAGE_SIZE, MAP, MAP_CHANNELS, N_OPPONENT_FEATURES, N_STATE_FEATURES,
+    VisualObservation,
 };
 use crate::actor_critic::{ActorCritic, ActorCriticOutput, OutputGrad, log_softmax};
 use crate::opponent::network::{self as opponent_network, OPPONENT, OpponentInput, OpponentModel};
@@ -18,8 +19,8 @@ use crate::opponent::network::{self as opponent_network, OPPONENT, OpponentInput
 #[derive(Clone, Debug)]
 pub struct VisualNetwork {
     network: Network,
-    logits: Node,
-    value: Node,
+    logits: NodeId,
+    value: NodeId,
     /// Meaning of the outputs.
     action_space: ActionSpace,
     opponent: OpponentInput,
@@ -62,9 +63,10 @@ impl VisualNetwork {
         let mut net = Network::default();
         let image = net.input(PATCH_SIZE * PATCH_SIZE * IMAGE_CHANNELS);
         let map = net.auxiliary_input(MAP_CHANNELS, PATCHES_PER_SIDE / MAP.side);
-        let state = net.auxiliary_input(N_STATE, PATCHES_PER_SIDE);
+        let state = net.auxiliary_input(N_STATE_FEATURES, PATCHES_PER_SIDE);
         let has_opponent = opponent != OpponentInput::None;
-        let prediction = has_opponent.then(|| net.auxiliary_input(N_OPPONENT, PATCHES_PER_SIDE));
+        let prediction =
+            has_opponent.then(|| net.auxiliary_input(N_OPPONENT_FEATURES, PATCHES_PER_SIDE));
         let mut image_features = layer(&mut net, "image.patches", image, Kernel::POINTWISE, 32);
         for k in 0..3 {
             image_features = layer(&mut net, &format!("image{k}"), image_features, DOWNSAMPLE, 32);
@@ -185,7 +187,7 @@ fn sum_by_head(joint: &[f32], head_sizes: &[usize], sums: &mut [f32]) {
     }
 }
 
-fn layer(net: &mut Network, name: &str, from: Node, kernel: Kernel, channels: usize) -> Node {
+fn layer(net: &mut Network, name: &str, from: NodeId, kernel: Kernel, channels: usize) -> NodeId {
     let output = net.conv(name, from, kernel, channels);
     net.norm_relu(&format!("{name}.norm"), output)
 }
@@ -205,8 +207,8 @@ fn write_patches(image: &[u8], patches: &mut [f32]) {
 
 impl VisualNetwork {
     /// Creates the buffers of a pass.
-    pub fn pass(&self) -> Pass {
-        Pass::new(&self.network, widest())
+    pub fn pass(&self) -> TrainingPass {
+        TrainingPass::new(&self.network, widest())
     }
 }
 
@@ -221,7 +223,7 @@ impl ActorCritic for VisualNetwork {
         &self,
         parameters: &[f32],
         observations: impl Iterator<Item = &'a VisualObservation> + Clone,
-        pass: &mut Pass,
+        pass: &mut TrainingPass,
     ) -> Vec<ActorCriticOutput> {
         let n = observations.clone().count();
         let mut image = Tensor::zeros(Shape {
@@ -242,11 +244,11 @@ impl ActorCritic for VisualNetwork {
                 Tensor { shape, data }
             };
         let map = tensor(MAP.side, MAP_CHANNELS, |s| &s.map, 1.0);
-        let state = tensor(1, N_STATE, |s| &s.state, 1.0 / 255.0);
+        let state = tensor(1, N_STATE_FEATURES, |s| &s.state, 1.0 / 255.0);
         if self.opponent == OpponentInput::None {
             pass.forward_all(&self.network, parameters, &[&image, &map, &state]);
         } else {
-            let opponent = tensor(1, N_OPPONENT, |s| &s.opponent, 1.0 / 255.0);
+            let opponent = tensor(1, N_OPPONENT_FEATURES, |s| &s.opponent, 1.0 / 255.0);
             pass.forward_all(&self.network, parameters, &[&image, &map, &state, &opponent]);
         }
         let head_sizes = self.action_space.head_sizes();
@@ -264,7 +266,7 @@ impl ActorCritic for VisualNetwork {
         &self,
         parameters: &[f32],
         grad_outputs: &[OutputGrad],
-        pass: &mut Pass,
+        pass: &mut TrainingPass,
         grad_parameters: &mut [f32],
     ) {
         pass.zero_gradients();

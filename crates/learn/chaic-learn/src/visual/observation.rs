@@ -6,7 +6,7 @@ use chaic_agents::policies::ExternalPolicy;
 use chaic_core::geom::{Camera, forward};
 use chaic_core::{Briefing, Observation, Role};
 
-use crate::opponent::N_LIMITS;
+use crate::opponent::N_BODY_LIMITS;
 use crate::opponent::network::{N_GOALS, OpponentPrediction};
 use crate::scales::{flag, normalize_clamped};
 
@@ -40,7 +40,7 @@ pub const STATE_FEATURES: [&str; 16] = [
     "holds_9_or_more",
 ];
 /// Number of state features.
-pub const N_STATE: usize = STATE_FEATURES.len();
+pub const N_STATE_FEATURES: usize = STATE_FEATURES.len();
 const N_HELD: usize = 10;
 
 /// Observation, stored as bytes to save memory.
@@ -51,14 +51,14 @@ pub struct VisualObservation {
     /// Map, 0 or 1; shape [32, 32, 8].
     pub map: Vec<u8>,
     /// State features; 0 to 255 for 0 to 1, and for -1 to 1 where they may be negative.
-    pub state: [u8; N_STATE],
+    pub state: [u8; N_STATE_FEATURES],
     /// Features of [`opponent_features`]; empty without an opponent model.
     pub opponent: Vec<u8>,
 }
 
 /// Number of features of an opponent model's prediction: goals, limits, and the probability that
 /// the partner wants the class of the nearest visible target.
-pub const N_OPPONENT: usize = N_GOALS + N_LIMITS + 1;
+pub const N_OPPONENT_FEATURES: usize = N_GOALS + N_BODY_LIMITS + 1;
 
 /// Returns a prediction as bytes, 0 to 255 for 0 to 1.
 pub fn opponent_features(prediction: &OpponentPrediction, nearest_target: f32) -> Vec<u8> {
@@ -122,7 +122,7 @@ fn state(
     observation: &Observation,
     agent: &PlanningAgent<ExternalPolicy>,
     briefing: &Briefing,
-) -> [u8; N_STATE] {
+) -> [u8; N_STATE_FEATURES] {
     let proprioception = &observation.proprioception;
     let bounds = briefing.bounds;
     let size = bounds.size();
@@ -133,7 +133,7 @@ fn state(
         memory.hands.all().any(|(_, class)| class.info().role == Role::Container)
     });
     let frames_left = briefing.horizon.saturating_sub(observation.frame) as f32;
-    let mut state = [0; N_STATE];
+    let mut state = [0; N_STATE_FEATURES];
     let values = [
         (at.x - bounds.min.x) / size.x.max(1.0),
         (at.z - bounds.min.y) / size.y.max(1.0),

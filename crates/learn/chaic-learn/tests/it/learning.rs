@@ -21,7 +21,7 @@ use chaic_learn::train::{CloningConfig, ExpertConfig, PolicyTrainer, RolloutConf
 use chaic_learn::visual::actions::ActionSpace;
 use chaic_learn::visual::network::VisualNetwork;
 use chaic_learn::visual::observation::{
-    IMAGE_CHANNELS, IMAGE_SIZE, MAP, N_STATE, VisualObservation,
+    IMAGE_CHANNELS, IMAGE_SIZE, MAP, N_STATE_FEATURES, VisualObservation,
 };
 use chaic_training::{Learner, Metrics, Trainer as _};
 use rayon::prelude::*;
@@ -142,7 +142,7 @@ fn visual_policies_learn_values_from_colors() {
         let observation = VisualObservation {
             image: pixels.concat(),
             map: vec![0; MAP.len()],
-            state: [0; N_STATE],
+            state: [0; N_STATE_FEATURES],
             opponent: Vec::new(),
         };
         let reward = if is_red { 1.0 } else { -1.0 };

@@ -14,8 +14,8 @@ use chaic_learn::opponent::collect::{
 use chaic_learn::opponent::network::{OpponentModel, network};
 use chaic_learn::opponent::report::OpponentReport;
 use chaic_learn::opponent::train::{OpponentConfig, OpponentTrainer};
-use chaic_learn::opponent::window::{N_CLASS, N_STATE};
-use chaic_learn::opponent::{N_LIMITS, OpponentGoal, limits};
+use chaic_learn::opponent::window::{N_CLASS_FEATURES, N_STATE_FEATURES};
+use chaic_learn::opponent::{N_BODY_LIMITS, OpponentGoal, limits};
 use chaic_training::conformance::{bounds_every_number, refuses_damaged_checkpoints};
 use chaic_training::run::checkpoint_bytes;
 use chaic_training::{CHECKPOINT, CONFIG, CURVES, Metrics, Trainer, TrainingError, TrainingRun};
@@ -42,7 +42,10 @@ fn windows_are_within_bounds_and_read_back_unchanged() {
     assert!(samples.iter().any(|s| s.target.is_some()));
     for sample in &samples {
         let CandidateSet { state, candidates, n_candidates, .. } = &sample.window;
-        assert_eq!((state.len(), candidates.len()), (N_STATE, n_candidates * N_CLASS));
+        assert_eq!(
+            (state.len(), candidates.len()),
+            (N_STATE_FEATURES, n_candidates * N_CLASS_FEATURES)
+        );
         let all = || state.iter().chain(candidates);
         assert!(all().all(|x| (-1.0..=1.0).contains(x)), "{:?}", all().collect::<Vec<_>>());
         assert!(
@@ -87,11 +90,11 @@ fn the_rules_and_the_belief_tell_the_target_of_the_partner() {
     let samples = collect(DatasetSplit::Test, &config, &mut |_| (), &NEVER_STOP).unwrap().unwrap();
     let (mut of_target, mut of_others) = (0.0, 0.0);
     for (window, target) in samples.iter().filter_map(|s| Some((&s.window, s.target?))) {
-        for (k, row) in window.candidates.chunks_exact(N_CLASS).enumerate() {
+        for (k, row) in window.candidates.chunks_exact(N_CLASS_FEATURES).enumerate() {
             // `is_next` is the last feature of a class.
             match k == target {
-                true => of_target += row[N_CLASS - 1],
-                false => of_others += row[N_CLASS - 1] / (window.n_candidates - 1) as f32,
+                true => of_target += row[N_CLASS_FEATURES - 1],
+                false => of_others += row[N_CLASS_FEATURES - 1] / (window.n_candidates - 1) as f32,
             }
         }
     }
@@ -101,7 +104,7 @@ fn the_rules_and_the_belief_tell_the_target_of_the_partner() {
 #[test]
 fn limits_describe_the_body() {
     let limits_of = |persona: Persona| limits(&persona.capability());
-    assert_eq!(limits_of(Persona::Adult), [1.0; N_LIMITS]);
+    assert_eq!(limits_of(Persona::Adult), [1.0; N_BODY_LIMITS]);
     assert_eq!(limits_of(Persona::Child), [0.0, 1.0, 0.0, 1.0, 1.0]);
     assert_eq!(limits_of(Persona::Wheelchair), [0.0, 0.0, 0.8, 1.0, 0.0]);
     assert_eq!(limits_of(Persona::Rider)[3], 0.0);
@@ -225,14 +228,14 @@ fn granted_windows_need_granted_behavior() {
 fn sample(goal: OpponentGoal, episode: u32) -> LabeledWindow {
     LabeledWindow {
         window: CandidateSet {
-            state: vec![0.0; N_STATE],
-            candidates: vec![0.0; 2 * N_CLASS],
+            state: vec![0.0; N_STATE_FEATURES],
+            candidates: vec![0.0; 2 * N_CLASS_FEATURES],
             n_candidates: 2,
             memory: Vec::new(),
         },
         goal,
         target: (goal == OpponentGoal::Pick).then_some(0),
-        limits: [1.0; N_LIMITS],
+        limits: [1.0; N_BODY_LIMITS],
         episode,
     }
 }

@@ -18,7 +18,9 @@ use chaic_episodes::find_episode;
 use chaic_learn::bundled::BundledPartner;
 use chaic_learn::helpers::{PartnerPolicy, PolicyRegistry};
 use chaic_learn::partner::demonstrator::{DemonstrationEpisode, Demonstrator};
-use chaic_learn::partner::features::{N_PARTNER_PLAN, N_PARTNER_STATE, nearest_wanted};
+use chaic_learn::partner::features::{
+    N_PARTNER_PLAN_FEATURES, N_PARTNER_STATE_FEATURES, nearest_wanted,
+};
 use chaic_learn::partner::recordings::read_recordings;
 use chaic_learn::partner::train::{PartnerCloningConfig, PartnerCloningTrainer};
 use chaic_training::conformance::{bounds_every_number, refuses_damaged_checkpoints};
@@ -124,8 +126,11 @@ fn demonstrations_hold_the_choices_of_the_partner() {
     assert!(decisions.len() > 5, "{}", decisions.len());
     for decision in &decisions {
         let observation = &decision.observation;
-        assert_eq!(observation.state.len(), N_PARTNER_STATE);
-        assert_eq!(observation.candidates.len(), N_PARTNER_PLAN * observation.n_candidates);
+        assert_eq!(observation.state.len(), N_PARTNER_STATE_FEATURES);
+        assert_eq!(
+            observation.candidates.len(),
+            N_PARTNER_PLAN_FEATURES * observation.n_candidates
+        );
         let features = observation.state.iter().chain(&observation.candidates);
         assert!(features.clone().all(|x| (-1.0..=2.0).contains(x)), "{observation:?}");
         // The rules are their own demonstrator, and fetch the nearest wanted target.

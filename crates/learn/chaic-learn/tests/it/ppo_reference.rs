@@ -9,7 +9,7 @@ use chaic_core::geom::math;
 use chaic_core::rng::RngStream;
 use chaic_learn::actor_critic::{ActorCritic, ActorCriticOutput, OutputGrad, log_softmax};
 use chaic_learn::ppo::{PpoConfig, Schedule, Trajectory, Transition, compute_gae, update};
-use chaic_nn::{Network, Node, Pass, Shape, Tensor};
+use chaic_nn::{Network, NodeId, Shape, Tensor, TrainingPass};
 use chaic_training::Learner;
 use serde::Deserialize;
 
@@ -42,8 +42,8 @@ struct Case {
 /// Linear policy and value.
 struct Linear {
     network: Network,
-    logits: Node,
-    value: Node,
+    logits: NodeId,
+    value: NodeId,
 }
 
 impl Linear {
@@ -67,7 +67,7 @@ impl ActorCritic for Linear {
         &self,
         parameters: &[f32],
         observations: impl Iterator<Item = &'a Vec<f32>> + Clone,
-        pass: &mut Pass,
+        pass: &mut TrainingPass,
     ) -> Vec<ActorCriticOutput> {
         let data: Vec<f32> = observations.flatten().copied().collect();
         let n = data.len() / N_FEATURES;
@@ -86,7 +86,7 @@ impl ActorCritic for Linear {
         &self,
         parameters: &[f32],
         grad_outputs: &[OutputGrad],
-        pass: &mut Pass,
+        pass: &mut TrainingPass,
         grad_parameters: &mut [f32],
     ) {
         pass.zero_gradients();

@@ -12,7 +12,7 @@ use chaic_core::TaskId;
 use chaic_env::RewardWeights;
 use chaic_env::helper_registry::{BuiltInHelpers, HelperRegistry as _};
 use chaic_learn::candidate_scorer::CandidateSet;
-use chaic_learn::features::{N_PLAN, N_STATE};
+use chaic_learn::features::{N_PLAN_FEATURES, N_STATE_FEATURES};
 use chaic_learn::helpers::{NamedPolicy, PolicyRegistry};
 use chaic_learn::opponent;
 use chaic_learn::opponent::network::OpponentInput;
@@ -492,8 +492,8 @@ fn features_lie_within_bounds_and_rewards_sum_to_the_score() {
         let mut frames = 0.0;
         for transition in &result.trajectory.transitions {
             let decision = &transition.observation;
-            assert_eq!(decision.state.len(), N_STATE);
-            assert_eq!(decision.candidates.len(), decision.n_candidates * N_PLAN);
+            assert_eq!(decision.state.len(), N_STATE_FEATURES);
+            assert_eq!(decision.candidates.len(), decision.n_candidates * N_PLAN_FEATURES);
             let all = decision.state.iter().chain(&decision.candidates);
             assert!(all.clone().all(|x| (-1.0..=1.0).contains(x)), "{all:?}");
             reward += f64::from(transition.reward);

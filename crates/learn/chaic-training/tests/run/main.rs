@@ -8,7 +8,7 @@ use std::{fs, io};
 
 use chaic_files::FileError;
 use chaic_nn::weights::{self, WeightsError};
-use chaic_nn::{AdamWConfig, Network, Pass};
+use chaic_nn::{AdamWConfig, Network, TrainingPass};
 use chaic_training::bounds::{BoundTable, LEARNING_RATE, STEPS, integer};
 use chaic_training::checkpoint::Identity;
 use chaic_training::conformance::{bounds_every_number, refuses_damaged_checkpoints};
@@ -163,12 +163,13 @@ impl<const HAS_SCORE: bool> Trainer for Toy<HAS_SCORE> {
 
     fn step(&mut self, stop: &AtomicBool) -> Result<Option<Metrics>, TrainingError> {
         let step = self.steps_done() + 1;
-        let gradient = |shard: usize, parameters: &[f32], _: &mut Pass, gradient: &mut [f32]| {
-            for (g, x) in gradient.iter_mut().zip(parameters) {
-                *g = x - 1.0 - 0.01 * (step + shard as u64) as f32;
-            }
-            (!stop.load(Ordering::Relaxed)).then(|| f64::from(gradient[0].abs()))
-        };
+        let gradient =
+            |shard: usize, parameters: &[f32], _: &mut TrainingPass, gradient: &mut [f32]| {
+                for (g, x) in gradient.iter_mut().zip(parameters) {
+                    *g = x - 1.0 - 0.01 * (step + shard as u64) as f32;
+                }
+                (!stop.load(Ordering::Relaxed)).then(|| f64::from(gradient[0].abs()))
+            };
         let (adam, learning_rate) = (AdamWConfig::default(), self.config.learning_rate);
         let losses = self.learner.step(&self.network, &adam, learning_rate, gradient);
         let Some(losses) = losses else { return Ok(None) };

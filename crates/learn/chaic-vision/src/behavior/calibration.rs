@@ -10,7 +10,7 @@
 //! clips overlap by five sixths, and a behavior is reported at most once in 45 frames.
 
 use super::Behavior;
-use super::clip::{Clip, ClipSet, Counts, MIXED};
+use super::clip::{Clip, ClipCounts, ClipSet, MIXED_INDEX};
 use crate::loss::ln;
 
 const N: usize = Behavior::ALL.len();
@@ -75,9 +75,9 @@ impl Calibration {
 /// Returns the logarithm of the ratio of frequencies in play and in training batches, by behavior; 0 for
 /// behaviors that no batch has, since the network knows nothing of them. Each count is increased by one, so
 /// that a behavior without clips keeps a probability.
-fn prior_correction(found: &Counts, batch_fractions: &BehaviorScores) -> BehaviorScores {
+fn prior_correction(found: &ClipCounts, batch_fractions: &BehaviorScores) -> BehaviorScores {
     let mut counts: BehaviorScores = std::array::from_fn(|k| found[k] as f32 + 1.0);
-    counts[Behavior::Moving.index()] += found[MIXED] as f32;
+    counts[Behavior::Moving.index()] += found[MIXED_INDEX] as f32;
     let total: f32 = counts.iter().sum();
     std::array::from_fn(|k| match batch_fractions[k] > 0.0 {
         true => ln(counts[k] / total / batch_fractions[k]),

@@ -3,12 +3,12 @@
 use chaic_core::rng::RngStream;
 
 use super::Behavior;
-use super::crop::{CENTER_HEIGHT_M, PersonCrop, SIDE, SLACK_M};
+use super::crop::{CENTER_HEIGHT_M, CROP_DEAD_BAND_M, PersonCrop, SIDE};
 
 /// Crops that the network reads: 96 frames, 3.2 seconds.
 pub const CROPS: usize = 32;
 /// Additional crops of a labeled clip; the network's input starts at any of them.
-pub const SLACK: usize = 4;
+pub const N_EXTRA_CROPS: usize = 4;
 /// Channels of a pixel: red, green and blue from -1 to 1, depth relative to the person, height
 /// above the crop's center, whether it is near the person's axis, brightness and depth in the
 /// previous crop, the person's distance and speed (-1 if unknown).
@@ -26,22 +26,22 @@ pub struct Clip {
     pub is_mixed: bool,
     /// Number of its episode. Clips of one episode are not independent.
     pub episode: u32,
-    /// [`CROPS`] and [`SLACK`] crops, oldest first.
+    /// [`CROPS`] and [`N_EXTRA_CROPS`] crops, oldest first.
     pub crops: Vec<PersonCrop>,
 }
 
 impl Clip {
-    /// Returns the index of the clip's kind in [`Counts`].
+    /// Returns the index of the clip's kind in [`ClipCounts`].
     pub fn kind(&self) -> usize {
-        if self.is_mixed { MIXED } else { self.label.index() }
+        if self.is_mixed { MIXED_INDEX } else { self.label.index() }
     }
 }
 
-/// Index of mixed clips in [`Counts`].
-pub const MIXED: usize = Behavior::ALL.len();
+/// Index of mixed clips in [`ClipCounts`].
+pub const MIXED_INDEX: usize = Behavior::ALL.len();
 
 /// Number of clips of each behavior; mixed clips are last.
-pub type Counts = [usize; MIXED + 1];
+pub type ClipCounts = [usize; MIXED_INDEX + 1];
 
 /// Clips of some episodes.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -50,20 +50,20 @@ pub struct ClipSet {
     pub clips: Vec<Clip>,
     /// Number of all clips that the episodes gave, with those beyond the maximum of their kind. These are the
     /// relative frequencies of what helpers see.
-    pub found: Counts,
+    pub found: ClipCounts,
 }
 
 impl ClipSet {
     /// Creates the set of all clips that episodes gave.
     pub fn new(clips: Vec<Clip>) -> ClipSet {
-        let mut found = Counts::default();
+        let mut found = ClipCounts::default();
         clips.iter().for_each(|clip| found[clip.kind()] += 1);
         ClipSet { clips, found }
     }
 
     /// Returns the weight of each clip with which kinds are as frequent as helpers see them.
     pub fn weights(&self) -> Vec<f64> {
-        let mut kept = Counts::default();
+        let mut kept = ClipCounts::default();
         self.clips.iter().for_each(|clip| kept[clip.kind()] += 1);
         let weight = |clip: &Clip| self.found[clip.kind()] as f64 / kept[clip.kind()] as f64;
         self.clips.iter().map(weight).collect()
@@ -112,10 +112,10 @@ impl ClipAugmentation {
         let shift = [shift(), shift()];
         let brightness = rng.range(0.75, 1.25);
         let gain = [(); 3].map(|()| brightness * rng.range(0.85, 1.15));
-        let depth_offset_m = rng.range(-SLACK_M, SLACK_M);
+        let depth_offset_m = rng.range(-CROP_DEAD_BAND_M, CROP_DEAD_BAND_M);
         let n_blanked = if rng.chance(0.25) { rng.below(CROPS / 4) } else { 0 };
         ClipAugmentation {
-            first: rng.below(SLACK + 1),
+            first: rng.below(N_EXTRA_CROPS + 1),
             is_mirrored: rng.chance(0.5),
             shift,
             depth_offset_m,

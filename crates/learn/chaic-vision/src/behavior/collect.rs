@@ -21,7 +21,7 @@ use chaic_nn::normal;
 use chaic_world::EventKind;
 
 use super::Behavior;
-use super::clip::{CROPS, Clip, ClipSet, Counts, SLACK, is_seen_enough};
+use super::clip::{CROPS, Clip, ClipCounts, ClipSet, N_EXTRA_CROPS, is_seen_enough};
 use super::config::ClipCollectionConfig;
 use super::crop::{HISTORY, PersonCrop, PersonCropper, visible_position};
 use super::store::{ClipFolder, StoreError};
@@ -77,11 +77,11 @@ pub struct Collector<'a> {
 /// If the folder cannot be read or written.
 pub fn collect(
     collector: &Collector<'_>,
-    progress: &mut dyn FnMut(usize, &Counts),
+    progress: &mut dyn FnMut(usize, &ClipCounts),
     stop: &AtomicBool,
 ) -> Result<Option<ClipSet>, StoreError> {
     let Collector { split, config, perception, n_threads, folder } = *collector;
-    let (mut collected, mut counts): (ClipSet, Counts) = Default::default();
+    let (mut collected, mut counts): (ClipSet, ClipCounts) = Default::default();
     let learned_perception = (config.learned_fraction > 0.0)
         .then(|| LearnedPerceptionFactory::new(TrainedDetector::built_in()));
     let noisy_perception =
@@ -281,15 +281,15 @@ impl Interactions {
             let label = interaction.behavior?;
             let end = crops.partition_point(|crop| crop.frame < interaction.end);
             let clip = clip_at(crops, (end + 1).checked_sub(CROPS)?, label, false)?;
-            let last = clip.crops[CROPS + SLACK - 1].frame;
+            let last = clip.crops[CROPS + N_EXTRA_CROPS - 1].frame;
             let is_next = |d: &&Interaction| {
                 (interaction.end + 1..=last).contains(&d.end) && d.behavior.is_some()
             };
             (self.ended.iter().find(is_next).is_none()).then_some(clip)
         });
         let moving = (0..crops.len()).step_by(MOVING_STEP).filter_map(|first| {
-            let frames =
-                [0, CROPS - 1, CROPS + SLACK - 1].map(|k| Some(crops.get(first + k)?.frame));
+            let frames = [0, CROPS - 1, CROPS + N_EXTRA_CROPS - 1]
+                .map(|k| Some(crops.get(first + k)?.frame));
             let [Some(start), Some(end), Some(last)] = frames else { return None };
             let mut is_mixed = false;
             for interaction in self.all() {
@@ -310,7 +310,7 @@ impl Interactions {
 /// Returns the clip that starts at this crop, if it has no gap and every input that it contains shows the
 /// person.
 fn clip_at(crops: &[PersonCrop], first: usize, label: Behavior, is_mixed: bool) -> Option<Clip> {
-    let crops = crops.get(first..first + CROPS + SLACK)?;
+    let crops = crops.get(first..first + CROPS + N_EXTRA_CROPS)?;
     let is_contiguous =
         crops.windows(2).all(|pair| pair[1].frame == pair[0].frame + HISTORY.every_frames);
     let is_seen = crops.windows(CROPS).all(is_seen_enough);
@@ -356,12 +356,12 @@ mod tests {
     #[test]
     fn every_input_of_a_clip_shows_the_person() {
         let label = Behavior::Moving;
-        let n = CROPS + SLACK;
+        let n = CROPS + N_EXTRA_CROPS;
         let n_seen = 7;
         for first in 0..n - n_seen {
             let crops = crops(n, |k| (first..first + n_seen).contains(&k));
             // The inputs have all crops but up to four at the start and at the end.
-            let are_common = (SLACK..=CROPS - n_seen).contains(&first);
+            let are_common = (N_EXTRA_CROPS..=CROPS - n_seen).contains(&first);
             assert_eq!(clip_at(&crops, 0, label, false).is_some(), are_common, "from {first}");
         }
     }

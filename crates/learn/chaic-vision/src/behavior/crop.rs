@@ -31,7 +31,7 @@ const MIN_BODY_HEIGHT_M: f32 = 0.3;
 const MIN_BODY_PIXELS: usize = 20;
 /// Displacement that crops ignore, meters. Positions are means over masks, which vary from image to
 /// image and with the arms. Nearly all errors of the bundled detector are smaller.
-pub const SLACK_M: f32 = 0.1;
+pub const CROP_DEAD_BAND_M: f32 = 0.1;
 
 /// Crop of a person.
 #[derive(Clone, Debug, PartialEq)]
@@ -149,7 +149,8 @@ impl Sighting {
     /// Returns the position after a move to `at`, short of the ignored displacement.
     fn follow(&self, at: Vec3) -> Vec3 {
         let displacement_m = horizontal_distance(self.position_in_world, at);
-        let fraction = (displacement_m - SLACK_M).max(0.0) / displacement_m.max(SLACK_M);
+        let fraction =
+            (displacement_m - CROP_DEAD_BAND_M).max(0.0) / displacement_m.max(CROP_DEAD_BAND_M);
         self.position_in_world + fraction * (at - self.position_in_world)
     }
 

@@ -3,7 +3,7 @@
 
 use chaic_nn::simd::widest;
 use chaic_nn::weights::WeightsError;
-use chaic_nn::{Kernel, Network, Node, Pass, Shape, Tensor, weights};
+use chaic_nn::{Kernel, Network, NodeId, Shape, Tensor, TrainingPass, weights};
 
 use super::Behavior;
 use super::calibration::{BehaviorScores, Calibration};
@@ -24,7 +24,7 @@ pub struct BehaviorNetwork {
     /// All layers.
     pub network: Network,
     /// Logit of each behavior.
-    pub head: Node,
+    pub head: NodeId,
 }
 
 impl Default for BehaviorNetwork {
@@ -133,12 +133,17 @@ impl TrainedBehavior {
     }
 
     /// Creates buffers for inference with the current parameters.
-    pub fn pass(&self) -> Pass {
-        Pass::with_constant_parameters(&self.network.network, &self.parameters, widest())
+    pub fn pass(&self) -> TrainingPass {
+        TrainingPass::with_constant_parameters(&self.network.network, &self.parameters, widest())
     }
 
     /// Returns the logits of [`CROPS`] crops; `pass` is one of [`TrainedBehavior::pass`].
-    pub fn outputs(&self, crops: &[PersonCrop], first: usize, pass: &mut Pass) -> BehaviorScores {
+    pub fn outputs(
+        &self,
+        crops: &[PersonCrop],
+        first: usize,
+        pass: &mut TrainingPass,
+    ) -> BehaviorScores {
         let mut input = Tensor::zeros(BehaviorNetwork::input_shape(1));
         fill_input(crops, &ClipAugmentation::identity(first), &mut input.data);
         pass.forward(&self.network.network, &self.parameters, &input);

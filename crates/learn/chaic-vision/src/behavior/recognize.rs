@@ -14,10 +14,10 @@ use chaic_agents::perception_factory::PerceptionFactory;
 use chaic_core::geom::to_xz;
 use chaic_core::observation::{FrameHistorySpec, Grants, SensorConfig};
 use chaic_core::{Action, AgentId, FailureReason, Frame, Hand, Observation, Outcome, Vec2, Vec3};
-use chaic_nn::Pass;
+use chaic_nn::TrainingPass;
 
 use super::Behavior;
-use super::clip::{CROPS, SLACK, is_seen_enough};
+use super::clip::{CROPS, N_EXTRA_CROPS, is_seen_enough};
 use super::crop::{HISTORY, PersonCrop, PersonCropper, visible_position};
 use super::network::TrainedBehavior;
 use super::report::most_probable;
@@ -96,7 +96,7 @@ pub struct LearnedBehavior {
     /// Last recognized behavior, with or without a known object.
     last: Option<(Behavior, Frame)>,
     log: BehaviorLog,
-    pass: Pass,
+    pass: TrainingPass,
 }
 
 impl fmt::Debug for LearnedBehavior {
@@ -137,7 +137,7 @@ impl LearnedBehavior {
             self.crops.pop_front();
         }
         self.n_new += 1;
-        if self.crops.len() < CROPS || self.n_new <= SLACK {
+        if self.crops.len() < CROPS || self.n_new <= N_EXTRA_CROPS {
             return None;
         }
         self.n_new = 0;

@@ -7,11 +7,11 @@ use serde::Serialize;
 
 use super::Behavior;
 use super::calibration::BehaviorScores;
-use super::clip::{Clip, ClipSet, SLACK};
+use super::clip::{Clip, ClipSet, N_EXTRA_CROPS};
 use super::network::TrainedBehavior;
 use crate::calibration::weighted_calibration_error;
 use crate::parallel::map_in_order;
-use crate::track_evaluation::Rate;
+use crate::track_evaluation::RateEstimate;
 
 const N: usize = Behavior::ALL.len();
 
@@ -55,7 +55,7 @@ pub fn all_outputs(
         n_threads,
         stop,
         || trained.pass(),
-        |pass, k| trained.outputs(&clips[k].crops, k % (SLACK + 1), pass),
+        |pass, k| trained.outputs(&clips[k].crops, k % (N_EXTRA_CROPS + 1), pass),
     )
 }
 
@@ -112,7 +112,7 @@ pub fn report_of_outputs(
         episode[0] += usize::from(is_correct);
         episode[1] += 1;
     }
-    let top1 = Rate::new(by_episode.values().copied());
+    let top1 = RateEstimate::new(by_episode.values().copied());
     let rows = counts.iter().enumerate().filter(|(_, row)| row.iter().sum::<usize>() > 0);
     let recalls: Vec<f64> =
         rows.map(|(k, row)| row[k] as f64 / row.iter().sum::<usize>() as f64).collect();
@@ -126,7 +126,7 @@ pub fn report_of_outputs(
         top1_in_play: has_weights.then(|| correct / total),
         balanced: (top1.n > 0).then(|| recalls.iter().sum::<f64>() / recalls.len() as f64),
         calibration_error: has_weights.then(|| weighted_calibration_error(&scored)),
-        mixed_as_moving: Rate::new(std::iter::once(mixed)).value,
+        mixed_as_moving: RateEstimate::new(std::iter::once(mixed)).value,
         confusion: Behavior::ALL
             .iter()
             .map(|b| (b.name(), counts_by_name(&counts[b.index()])))

@@ -7,10 +7,11 @@ use std::path::{Path, PathBuf};
 use chaic_agents::perception_factory::{GROUND_TRUTH, PerceptionFactory};
 use chaic_core::Frame;
 use chaic_files::{FileError, create_folders, read_bounded, write_atomically};
+use chaic_training::settings::to_table;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
 
 use super::Behavior;
-use super::clip::{CROPS, Clip, ClipSet, Counts, SLACK};
+use super::clip::{CROPS, Clip, ClipCounts, ClipSet, N_EXTRA_CROPS};
 use super::config::ClipCollectionConfig;
 use super::crop::{PersonCrop, SIDE};
 use crate::views::DatasetSplit;
@@ -22,7 +23,7 @@ const CLIPS_VERSION: i64 = 4;
 /// Maximum size of a file, bytes.
 const MAX_BYTES: u64 = 1 << 30;
 /// Crops of a clip.
-const N_CROPS: usize = CROPS + SLACK;
+const N_CROPS: usize = CROPS + N_EXTRA_CROPS;
 const N_PIXELS: usize = SIDE * SIDE;
 /// Tensor with the number of clips of each kind that the episodes gave, u32.
 const FOUND: &str = "found";
@@ -111,7 +112,7 @@ impl ClipFolder {
         let Some((_, _, found_config)) = same_source else {
             return Err(StoreError::Config(folder.to_owned()));
         };
-        let (recorded, requested) = (values(&found_config), values(config));
+        let (recorded, requested) = (to_table(&found_config), to_table(config));
         let changed = requested.iter().find_map(|(key, value)| {
             let before = recorded.get(key).filter(|before| *before != value)?;
             Some(StoreError::Setting {
@@ -150,12 +151,6 @@ impl ClipFolder {
     pub fn write(&self, first_episode: usize, round: &ClipSet) -> Result<(), StoreError> {
         Ok(write_atomically(&self.path(first_episode), &to_bytes(round))?)
     }
-}
-
-/// Returns the values of a configuration as its file has them; each configuration has all keys.
-fn values(config: &ClipCollectionConfig) -> toml::Table {
-    let text = toml::to_string(config).expect("the configuration has string keys only");
-    text.parse().expect("serialized TOML can be parsed")
 }
 
 /// Parses a configuration file into split, perception and configuration; `None` if it is not one of
@@ -215,7 +210,7 @@ pub fn to_bytes(ClipSet { clips, found }: &ClipSet) -> Vec<u8> {
         ((*name).to_owned(), view.expect("the length matches the shape"))
     });
     let found: Vec<u8> = found.iter().flat_map(|n| (*n as u32).to_le_bytes()).collect();
-    let found_view = TensorView::new(Dtype::U32, vec![Counts::default().len()], &found);
+    let found_view = TensorView::new(Dtype::U32, vec![ClipCounts::default().len()], &found);
     let found_view = found_view.expect("the length matches the shape");
     let views = views.chain([(FOUND.to_owned(), found_view)]);
     serialize(views, None).expect("names are unique and shapes fit")
@@ -236,7 +231,7 @@ fn from_bytes(bytes: &[u8]) -> Result<ClipSet, String> {
         columns.push(tensor.data());
     }
     let found_tensor = file.tensor(FOUND).map_err(|e| e.to_string())?;
-    let mut found = Counts::default();
+    let mut found = ClipCounts::default();
     if found_tensor.dtype() != Dtype::U32 || found_tensor.shape() != [found.len()] {
         return Err(format!("{FOUND} is not {:?} {:?}", Dtype::U32, [found.len()]));
     }
@@ -364,7 +359,7 @@ mod tests {
         assert!(refused.to_string().contains("of another configuration"), "{refused}");
         assert!(open(dir.path(), DatasetSplit::Test, &config).is_err());
         let round = ClipSet::new(vec![clip(Behavior::PutOn, 0)]);
-        let fewer = ClipSet { found: Counts::default(), ..round.clone() };
+        let fewer = ClipSet { found: ClipCounts::default(), ..round.clone() };
         fs::write(folder.path(0), to_bytes(&fewer)).unwrap();
         let error = folder.read(0).unwrap_err().to_string();
         assert!(error.contains("found"), "{error}");

@@ -15,7 +15,8 @@ use chaic_training::{Checkpoint, Trainer as _, TrainingError, parse_config};
 use super::Behavior;
 use super::calibration::{BehaviorScores, Calibration, softmax};
 use super::clip::{
-    CROPS, Clip, ClipAugmentation, ClipSet, Counts, N_CHANNELS, SLACK, fill_input, is_seen_enough,
+    CROPS, Clip, ClipAugmentation, ClipCounts, ClipSet, N_CHANNELS, N_EXTRA_CROPS, fill_input,
+    is_seen_enough,
 };
 use super::collect::{Collector, collect, with_noise};
 use super::config::ClipCollectionConfig;
@@ -213,7 +214,7 @@ fn clips_are_contiguous_show_the_person_and_do_not_depend_on_threads() {
         n_threads: 2,
         folder: Some(&folder),
     };
-    let mut raise = |_, _: &Counts| stop.store(true, Ordering::Relaxed);
+    let mut raise = |_, _: &ClipCounts| stop.store(true, Ordering::Relaxed);
     assert!(collect(&collector, &mut raise, &stop).unwrap().is_none());
     assert!(folder.read(0).unwrap().is_none());
     let kept = ClipSet::new(one.clips.clone()).found;
@@ -223,7 +224,7 @@ fn clips_are_contiguous_show_the_person_and_do_not_depend_on_threads() {
     let labels: BTreeSet<Behavior> = one.iter().map(|clip| clip.label).collect();
     assert!(labels.contains(&Behavior::PickedUp) && labels.contains(&Behavior::Moving));
     for clip in &one {
-        assert_eq!(clip.crops.len(), CROPS + SLACK);
+        assert_eq!(clip.crops.len(), CROPS + N_EXTRA_CROPS);
         let frames = clip.crops.windows(2).map(|pair| pair[1].frame - pair[0].frame);
         assert!(frames.into_iter().all(|n| n == HISTORY.every_frames));
         assert!(clip.crops.windows(CROPS).all(is_seen_enough));
@@ -245,7 +246,7 @@ fn synthetic_clips() -> Vec<Clip> {
         label,
         is_mixed: false,
         episode: 0,
-        crops: (0..CROPS + SLACK).map(|k| crop(red, k)).collect(),
+        crops: (0..CROPS + N_EXTRA_CROPS).map(|k| crop(red, k)).collect(),
     };
     vec![clip(Behavior::PickedUp, 10), clip(Behavior::PutIn, 245)]
 }

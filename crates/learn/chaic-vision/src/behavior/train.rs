@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use chaic_core::rng::RngStream;
 use chaic_nn::weights::WeightsError;
-use chaic_nn::{AdamWConfig, Network, Pass, Tensor};
+use chaic_nn::{AdamWConfig, Network, Tensor, TrainingPass};
 use chaic_training::bounds::{
     ADAM, Bound, BoundTable, FRACTION, LEARNING_RATE, SEED, SHARDS, STEPS, integer,
 };
@@ -19,7 +19,7 @@ use chaic_agents::perception_factory::GroundTruthPerceptionFactory;
 
 use super::Behavior;
 use super::calibration::{BehaviorScores, Calibration, softmax};
-use super::clip::{Clip, ClipAugmentation, ClipSet, Counts, MIXED, fill_input};
+use super::clip::{Clip, ClipAugmentation, ClipCounts, ClipSet, MIXED_INDEX, fill_input};
 use super::collect::{Collector, collect};
 use super::config::{COLLECT_BOUNDS, ClipCollectionConfig};
 use super::network::{BehaviorNetwork, TrainedBehavior};
@@ -93,7 +93,7 @@ pub struct BehaviorLearner {
 }
 
 /// Clips of each behavior; mixed clips are last.
-type ClipsByKind = [Vec<Clip>; MIXED + 1];
+type ClipsByKind = [Vec<Clip>; MIXED_INDEX + 1];
 
 /// Metrics of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -136,7 +136,7 @@ impl BehaviorLearner {
         let BehaviorLearner { config, network, learner, clips } = self;
         let (config, network, clips) = (&*config, &*network, &*clips);
         let shard_gradient =
-            |shard: usize, parameters: &[f32], pass: &mut Pass, gradient: &mut [f32]| {
+            |shard: usize, parameters: &[f32], pass: &mut TrainingPass, gradient: &mut [f32]| {
                 let index = step * config.shards as u64 + shard as u64;
                 let mut rng = RngStream::new(config.seed, "clips", index);
                 let batch: Vec<&Clip> = (0..config.batch_size)
@@ -269,7 +269,7 @@ impl Trainer for BehaviorTrainer {
             let folder = Some(&ClipFolder::open(&path, split, &config, perception)?);
             let collector =
                 Collector { split, config: &config, perception, n_threads: THREADS, folder };
-            let mut report_progress = |n: usize, counts: &Counts| {
+            let mut report_progress = |n: usize, counts: &ClipCounts| {
                 progress(&format!("{n} {name} episodes, clips {counts:?}"));
             };
             collect(&collector, &mut report_progress, stop)
@@ -365,7 +365,7 @@ fn draw_clip<'a>(
     rng: &mut RngStream,
 ) -> Option<&'a Clip> {
     let kind = *rng.choose(&drawn_behaviors(clips))?;
-    let mixed = &clips[MIXED];
+    let mixed = &clips[MIXED_INDEX];
     let is_mixed = rng.chance(config.mixed_fraction) && kind == Behavior::Moving.index();
     rng.choose(if is_mixed && !mixed.is_empty() { mixed } else { &clips[kind] })
 }
@@ -411,7 +411,7 @@ mod tests {
         let learner = BehaviorLearner::new(BehaviorTrainingConfig::default(), clips);
         assert_eq!(learner.batch_fractions(), [0.25, 0.0, 0.25, 0.0, 0.0, 0.5]);
         let mut rng = RngStream::new(1, "draws", 0);
-        let mut n = Counts::default();
+        let mut n = ClipCounts::default();
         for _ in 0..4000 {
             n[draw_clip(&learner.clips, &learner.config, &mut rng).unwrap().kind()] += 1;
         }

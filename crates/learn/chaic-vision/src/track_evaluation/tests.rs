@@ -16,7 +16,7 @@ fn report_of(noise: DetectorNoiseModel) -> TrackReport {
 fn perfect_detections_are_remembered_and_errors_lower_the_scores() {
     let perfect = report_of(DetectorNoiseModel::none());
     assert!(perfect.episodes == 2 && perfect.failures.is_empty(), "{perfect:?}");
-    let value = |rate: Rate| rate.value.unwrap();
+    let value = |rate: RateEstimate| rate.value.unwrap();
     assert!(value(perfect.detection_precision) > 0.99, "{perfect:?}");
     assert!(value(perfect.detection_recall) > 0.95, "{perfect:?}");
     assert!(value(perfect.memory_recall) > 0.9, "{perfect:?}");
@@ -32,7 +32,8 @@ fn perfect_detections_are_remembered_and_errors_lower_the_scores() {
         false_positives_per_image: 0.2,
         ..DetectorNoiseModel::none()
     });
-    let values = |rate: fn(&TrackReport) -> Rate| [&noisy, &perfect].map(|r| value(rate(r)));
+    let values =
+        |rate: fn(&TrackReport) -> RateEstimate| [&noisy, &perfect].map(|r| value(rate(r)));
     let [noisy_precision, perfect_precision] = values(|report| report.detection_precision);
     assert!(noisy_precision < perfect_precision, "{noisy:?}");
     let [noisy_precision, perfect_precision] = values(|report| report.memory_precision);
@@ -43,14 +44,17 @@ fn perfect_detections_are_remembered_and_errors_lower_the_scores() {
 
 #[test]
 fn ratios_without_counts_and_intervals_of_one_episode_are_undefined() {
-    let rate = |counts: &[[usize; 2]]| Rate::new(counts.iter().copied());
-    let undefined = Rate { value: None, interval: None, n: 0 };
+    let rate = |counts: &[[usize; 2]]| RateEstimate::new(counts.iter().copied());
+    let undefined = RateEstimate { value: None, interval: None, n: 0 };
     assert_eq!(rate(&[]), undefined);
     assert_eq!(rate(&[[0, 0], [0, 0]]), undefined);
-    let one_episode = Rate { value: Some(0.5), interval: None, n: 4 };
+    let one_episode = RateEstimate { value: Some(0.5), interval: None, n: 4 };
     assert_eq!(rate(&[[2, 4]]), one_episode);
     assert_eq!(rate(&[[0, 0], [2, 4], [0, 0]]), one_episode);
-    assert_eq!(rate(&[[1, 2], [2, 4]]), Rate { value: Some(0.5), interval: Some(0.0), n: 6 });
+    assert_eq!(
+        rate(&[[1, 2], [2, 4]]),
+        RateEstimate { value: Some(0.5), interval: Some(0.0), n: 6 }
+    );
     // Without any image, the confidences have no calibration error either.
     assert_eq!(TrackReport::new(&[EpisodeRecord::default()]).calibration_error, None);
 }
@@ -140,7 +144,7 @@ fn the_nearest_pairs_of_one_class_match() {
     assert_eq!(record.memory_precision([0.0, 2.0]), [1, 1]);
     assert_eq!(record.memory_precision([2.0, 4.0]), [1, 2]);
     assert_eq!(record.memory_precision([4.0, 10.0]), [0, 0]);
-    let rate = Rate::new([[1, 2], [3, 4]].into_iter());
+    let rate = RateEstimate::new([[1, 2], [3, 4]].into_iter());
     assert!((rate.value.unwrap() - 4.0 / 6.0).abs() < 1e-9 && rate.n == 6);
     assert!(rate.interval > Some(0.0));
 }

@@ -27,15 +27,15 @@ impl Tracker {
 
     /// Returns the reported tracks that probably do not exist. They count as unreported until they are
     /// detected again.
-    pub fn withdraw(&mut self) -> Vec<TrackId> {
-        let mut withdrawn = Vec::new();
+    pub fn take_retracted(&mut self) -> Vec<TrackId> {
+        let mut retracted = Vec::new();
         for track in &mut self.tracks {
             if track.is_reported && track.log_odds < 0.0 {
                 track.is_reported = false;
-                withdrawn.push(track.id);
+                retracted.push(track.id);
             }
         }
-        withdrawn
+        retracted
     }
 
     /// Lowers the log odds of tracks that are not detected although their place is visible. An image

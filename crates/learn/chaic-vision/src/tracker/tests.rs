@@ -2,7 +2,7 @@
 //! class have two tracks; uncertain objects are reported after a second detection; held objects and
 //! their contents are no detections; only images that can show an object are evidence against it.
 
-use chaic_agents::track::Carried;
+use chaic_agents::track::CarriedObject;
 use chaic_core::Hand;
 use chaic_core::briefing::{Companion, CompanionRole};
 use chaic_core::geom::yaw_rotation;
@@ -74,7 +74,7 @@ impl Observer {
     }
 
     fn hold(&mut self, held: Option<(TrackId, &str)>) {
-        let carried = held.map(|(track, class)| Carried {
+        let carried = held.map(|(track, class)| CarriedObject {
             object: Some((track, ClassId::named(class))),
             contents: Vec::new(),
             n_contents: 0,
@@ -288,7 +288,7 @@ fn contents_of_a_held_container_are_no_detections() {
     let basket = observer.observe(&[measurement("plastic_basket", 0.9, [0.0, 0.8, -1.0])])[0].track;
     let above = [-0.2, 1.25, -0.31 * 1.75];
     for (n_contents, n_detections) in [(0, 1), (1, 0)] {
-        let carried = Carried {
+        let carried = CarriedObject {
             object: Some((basket, ClassId::named("plastic_basket"))),
             contents: Vec::new(),
             n_contents,
@@ -525,12 +525,12 @@ fn a_reported_object_is_withdrawn_once_when_it_rather_does_not_exist() {
     let uncertain = measurement("refrigerator", 0.6, [0.0, 1.0, -4.0]);
     let id = observer.observe(std::slice::from_ref(&uncertain))[0].track;
     observer.observe(&[]);
-    assert!(observer.tracker.withdraw().is_empty(), "it may exist");
+    assert!(observer.tracker.take_retracted().is_empty(), "it may exist");
     observer.observe(&[]);
-    assert_eq!(observer.tracker.withdraw(), [id]);
+    assert_eq!(observer.tracker.take_retracted(), [id]);
     observer.observe(&[]);
-    assert!(observer.tracker.withdraw().is_empty(), "once");
+    assert!(observer.tracker.take_retracted().is_empty(), "once");
     // Never reported.
     observer.observe(&[measurement("refrigerator", 0.3, [3.0, 1.0, -4.0])]);
-    assert!(observer.tracker.withdraw().is_empty(), "it was not reported");
+    assert!(observer.tracker.take_retracted().is_empty(), "it was not reported");
 }

@@ -117,7 +117,7 @@ fn invalid_batches_give_errors() {
     let sight = Eyesight { range_m: 2.0, blur_rad: 0.0, field_rad: 3.0, lowered_rad: 0.0 };
     let limited = View { sight: Some(sight), ..view };
     let limited = gpu.render(&[(id, view), (id, limited)]).expect_err("sight cannot be limited");
-    assert!(matches!(limited, GpuError::LimitedSight { index: 1 }), "{limited}");
+    assert!(matches!(limited, GpuError::LimitedEyesight { index: 1 }), "{limited}");
     gpu.remove(id).expect("the world is on the device");
     assert!(matches!(gpu.render(&[(id, view)]), Err(GpuError::UnknownWorld(_))));
     assert!(matches!(gpu.update(id, &scene, &world), Err(GpuError::UnknownWorld(_))));

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use chaic_core::{AgentId, EntityId, Vec3};
-use chaic_render::geometry::{FINEST, Geometry, LightAssignment, N_LEVELS, Texture, tile};
+use chaic_render::geometry::{FINEST_LEVEL, Geometry, LightAssignment, N_LEVELS, Texture, tile};
 use chaic_render::{Channels, Scene, View};
 use chaic_test_kit::scenes::{camera, house, street, world};
 use chaic_world::{ObjectLocation, Posture, World};
@@ -69,7 +69,7 @@ fn rays_hit_the_rendered_surfaces() {
             images.depth_m.expect("the channel was requested"),
             images.ids.expect("the channel was requested"),
         );
-        let geometry = geometry_of(&world, FINEST);
+        let geometry = geometry_of(&world, FINEST_LEVEL);
         let (half, focal) = (0.5 * SIDE as f32, camera.focal_px());
         let (mut n, mut n_equal) = (0, 0);
         for row in (5..SIDE).step_by(11) {
@@ -93,10 +93,10 @@ fn rays_hit_the_rendered_surfaces() {
 fn shapes_are_shared_and_valid() {
     let world = world(house());
     let levels = Scene::new(world.setup()).geometry_at_all_levels(world.state(), &postures(&world));
-    assert_eq!(levels[FINEST], geometry_of(&world, FINEST));
-    assert_eq!(levels[FINEST], geometry_of(&world, N_LEVELS + 7), "past the finest");
+    assert_eq!(levels[FINEST_LEVEL], geometry_of(&world, FINEST_LEVEL));
+    assert_eq!(levels[FINEST_LEVEL], geometry_of(&world, N_LEVELS + 7), "past the finest");
     let count = |g: &Geometry| g.meshes.iter().map(|m| m.triangles.len()).sum::<usize>();
-    assert!(count(&levels[0]) * 3 < count(&levels[FINEST]));
+    assert!(count(&levels[0]) * 3 < count(&levels[FINEST_LEVEL]));
     for level in &levels {
         assert_eq!(level.instances, levels[0].instances);
         assert_eq!(level.meshes.len(), levels[0].meshes.len());

@@ -98,7 +98,7 @@ fn check_goal(setup: &Setup, strictness: Strictness, found: &mut Vec<Problem>) {
     if n_available == 0 && found.is_empty() {
         found.push(Problem::new("things", "hold no target of the goal"));
     }
-    let places = setup.goal_places.iter().filter_map(|e| setup.thing_index(*e));
+    let places = setup.goal_places.iter().filter_map(|e| setup.object_index(*e));
     for (i, k) in places.enumerate() {
         let object = &setup.things[k];
         let min_top_m = Rules::paper().goal_min_top_m(setup.task);
@@ -132,7 +132,7 @@ fn check_task(setup: &Setup, found: &mut Vec<Problem>) {
         _ => {}
     }
     if info.goal_approach == GoalApproach::NearestPoint {
-        let mut places = setup.goal_places.iter().filter_map(|e| setup.thing(*e));
+        let mut places = setup.goal_places.iter().filter_map(|e| setup.object(*e));
         if places.any(|t| !info.goal_places.contains(&t.class.name())) {
             let problem =
                 format!("contain an object that is not a {}", info.goal_places.join(" or "));

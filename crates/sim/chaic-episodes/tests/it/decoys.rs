@@ -51,7 +51,7 @@ fn features(setup: &Setup) -> BTreeMap<&'static str, u64> {
     let named = |t: &ObjectSpec, name: &str| t.class == ClassId::named(name);
     let briefed = World::new(setup.clone(), Rules::paper()).expect("it is valid");
     let delivery_mm = 1000.0 * briefed.delivery_radius_m();
-    let goal_place = setup.thing(setup.goal_places[0]).expect("it is valid").class;
+    let goal_place = setup.object(setup.goal_places[0]).expect("it is valid").class;
     BTreeMap::from([
         ("vases", count(&|t| named(t, "vase"))),
         ("vases high", count(&|t| named(t, "vase") && top_m(t) > 1.5)),

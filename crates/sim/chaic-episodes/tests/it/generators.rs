@@ -152,7 +152,7 @@ fn tasks_have_their_difficulties() {
         assert_eq!(count(&setup, |t| is_container(t) && t.position.y < 1.5), 0);
     }
     for setup in setups(TaskId::HighGoal) {
-        let places = setup.goal_places.iter().filter_map(|e| setup.thing(*e));
+        let places = setup.goal_places.iter().filter_map(|e| setup.object(*e));
         assert!(places.into_iter().all(|t| top_m(t) >= 1.5));
     }
 }
@@ -247,7 +247,7 @@ fn moving_house_has_five_pieces_and_a_truck() {
         assert_eq!(count(&setup, is_piece), 5);
         assert_eq!(setup.goal.total(), 5);
         assert_eq!(setup.horizon, 1500);
-        let truck = setup.thing(setup.goal_places[0]).expect("checked by validate");
+        let truck = setup.object(setup.goal_places[0]).expect("checked by validate");
         assert_eq!(truck.class.name(), "truck");
         for piece in setup.things.iter().filter(|t| is_piece(t)) {
             let away = to_xz(piece.position).distance(to_xz(truck.position));

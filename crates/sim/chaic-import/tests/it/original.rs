@@ -10,11 +10,12 @@ use chaic_core::TaskId;
 use chaic_core::geom::{horizontal_distance, to_xz};
 use chaic_core::task::SceneKind;
 use chaic_episodes::{Episode, ReachabilityParams, path_lengths_from};
-use chaic_import::{Half, Imported, OnError, Sources, house, import};
+use chaic_import::{Imported, OnError, SourceSplit, Sources, house, import};
 use chaic_world::{ObjectSpec, RoomKind, Rules, World};
 use serde_json::Value;
 
-const HALVES: [(Half, &str); 2] = [(Half::Train, "train"), (Half::Test, "test")];
+const HALVES: [(SourceSplit, &str); 2] =
+    [(SourceSplit::Train, "train"), (SourceSplit::Test, "test")];
 
 fn sources() -> Option<Sources> {
     let folder = |name: &str| {
@@ -197,7 +198,7 @@ fn houses_have_furniture_and_a_reachable_bed() {
     {
         let setup = house(&sources, scene, layout).expect("it is in the package");
         assert_eq!(setup.goal_places.len(), 1, "{scene}/{layout}");
-        let bed = setup.thing_index(setup.goal_places[0]).expect("a thing");
+        let bed = setup.object_index(setup.goal_places[0]).expect("a thing");
         let params = ReachabilityParams { radius_m: 0.2, reach_m: 0.7, cell_m: 0.1 };
         let lengths_m = path_lengths_from(&setup, bed, params);
         let n_reached = lengths_m.iter().filter(|m| m.is_finite()).count();

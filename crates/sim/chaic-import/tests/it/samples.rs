@@ -7,7 +7,7 @@ use std::path::Path;
 use chaic_core::geom::forward;
 use chaic_core::{ClassId, Vec3};
 use chaic_episodes::Episode;
-use chaic_import::{Half, Imported, OnError, Sources, import};
+use chaic_import::{Imported, OnError, SourceSplit, Sources, import};
 use chaic_world::{ObjectSpec, RoomKind, Setup};
 use serde_json::{Value, json};
 use tempfile::TempDir;
@@ -153,7 +153,7 @@ fn an_indoor_episode_equals_a_handmade_example() {
     assert!((forward(table.yaw_rad) - Vec3::X).length() < 1e-3, "Unity's 90 degrees is east");
     assert!(objects_of_class(setup, "trunk").is_empty(), "it is far outside the house");
     assert_eq!(setup.goal_places.len(), 1);
-    assert_eq!(setup.thing(setup.goal_places[0]).expect("it exists").class.name(), "bed");
+    assert_eq!(setup.object(setup.goal_places[0]).expect("it exists").class.name(), "bed");
     // The second region is a living room from x -2.58 to 4.052, z -5.583 to 0.082.
     assert_eq!(setup.rooms[1].kind, RoomKind::LivingRoom);
     assert!((setup.rooms[1].rect.max.y - 5.583).abs() < 1e-4);
@@ -184,8 +184,11 @@ fn the_other_folder_layout_is_accepted() {
         sample.path().join("room_types.json"),
     )
     .expect("the global copy");
-    let sources =
-        Sources { tdw: sample.path().join("tdw"), half: Some(Half::Train), ..sample.sources() };
+    let sources = Sources {
+        tdw: sample.path().join("tdw"),
+        half: Some(SourceSplit::Train),
+        ..sample.sources()
+    };
     let imported = import(&sources, OnError::Skip).expect("it is read");
     assert_eq!(imported.episodes.len(), 1);
 }

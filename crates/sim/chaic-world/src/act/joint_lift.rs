@@ -6,7 +6,7 @@ use chaic_core::geom::{Pose, horizontal_distance, wrap_angle};
 use chaic_core::{Action, AgentId, EntityId, ResolvedAction, Vec3};
 
 use crate::event::EventKind;
-use crate::rules::Blocking;
+use crate::rules::CollisionResponse;
 use crate::state::{ActionStep, Activity, JointCarry, Phase};
 use crate::tick::StepProgress;
 use crate::world::World;
@@ -14,7 +14,7 @@ use crate::world::World;
 impl World {
     /// Waits at furniture for another agent that wants the same piece. Starts a joint lift when
     /// both stand at it.
-    pub(crate) fn await_partner(
+    pub(crate) fn wait_for_other_agent(
         &mut self,
         agent: AgentId,
         activity: &mut Activity,
@@ -23,7 +23,7 @@ impl World {
         /// giving up.
         const GRACE_FRAMES: u32 = 3;
         let elapsed = activity.step.elapsed;
-        let Phase::AwaitPartner { object, absent } = &mut activity.step.phase else {
+        let Phase::WaitForOtherAgent { object, absent } = &mut activity.step.phase else {
             return StepProgress::Done;
         };
         let object = *object;
@@ -47,7 +47,7 @@ impl World {
         }
         let ready = matches!(
             self.person(other).activity.as_ref().map(|a| a.step.phase),
-            Some(Phase::AwaitPartner { .. })
+            Some(Phase::WaitForOtherAgent { .. })
         ) && self.check_within_reach(other, object).is_ok();
         if !ready {
             let max_frames = self.rules.durations.await_partner;
@@ -150,7 +150,7 @@ impl World {
     /// whether there is room.
     pub(crate) fn make_room_to_turn(&mut self, agent: AgentId, yaw_rad: f32) -> bool {
         let joint = self.state.joint.filter(|j| j.leader == agent && j.under_way);
-        let Some(joint) = joint.filter(|_| self.rules.blocking == Blocking::Stops) else {
+        let Some(joint) = joint.filter(|_| self.rules.blocking == CollisionResponse::Stops) else {
             return true;
         };
         let pose = self.person(agent).pose;

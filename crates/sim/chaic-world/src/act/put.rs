@@ -7,7 +7,7 @@ use chaic_core::{Action, AgentId, EntityId, ResolvedAction, Vec3};
 
 use crate::event::EventKind;
 use crate::random::RngPurpose;
-use crate::rules::ReachTo;
+use crate::rules::ReachReference;
 use crate::state::{ActionStep, Activity, ObjectLocation, Phase};
 use crate::tick::StepProgress;
 use crate::world::World;
@@ -124,7 +124,7 @@ impl World {
         if !self.object(place).1.is_resting() {
             return StepProgress::Failed(FailureReason::Impossible);
         }
-        if self.rules.reach_to == ReachTo::NearestPoint
+        if self.rules.reach_to == ReachReference::NearestPoint
             && let Err(reason) = self.check_within_reach(agent, place)
         {
             return StepProgress::Failed(reason);

@@ -418,7 +418,7 @@ fn two_agents_deliver_furniture_to_the_truck() {
     assert_eq!(outcome, Outcome::Success);
     assert!(w.is_over(), "all targets are on the truck");
     assert_eq!(w.progress(), (900.0, 900.0), "moving house counts mass");
-    let bed = chaic_world::top_surfaces(w.setup().thing(nth(1)).unwrap())[0].center.y;
+    let bed = chaic_world::top_surfaces(w.setup().object(nth(1)).unwrap())[0].center.y;
     assert!((w.state().objects[1].position.y - bed).abs() < 0.01, "it stands on the truck's bed");
 }
 

@@ -6,7 +6,9 @@ use chaic_core::action::{Action, FailureReason, Hand, Outcome};
 use chaic_core::capability::{Capability, Persona};
 use chaic_core::observation::Grants;
 use chaic_core::{ClassId, EntityId, ResolvedAction, TaskId};
-use chaic_world::{Blocking, Durations, EventKind, JointLift, ReachTo, Rules, Setup, World};
+use chaic_world::{
+    CollisionResponse, Durations, EventKind, JointLift, ReachReference, Rules, Setup, World,
+};
 
 const PAPER: Rules = Rules::paper();
 
@@ -37,7 +39,10 @@ fn compat_has_the_rules_of_the_original_and_no_other_differences() {
         [d.await_partner, d.raise_furniture, d.refused_pick_up, d.failed_grasp],
         [3000, 17, 37, 0]
     );
-    assert_eq!((rules.blocking, rules.reach_to), (Blocking::Creeps, ReachTo::Middle));
+    assert_eq!(
+        (rules.blocking, rules.reach_to),
+        (CollisionResponse::Creeps, ReachReference::Middle)
+    );
     assert_eq!((rules.joint_lift, rules.furniture_reach_limit_m), (JointLift::LastChoice, 3.0));
     assert!(
         rules.announces_removed_obstacles
@@ -77,7 +82,7 @@ fn creeping_agents_pass_through_walls_at_half_speed() {
     let mut solid = with(PAPER, setup());
     run(&mut solid, A, Action::MoveForward);
     assert_eq!(run(&mut solid, A, Action::MoveForward).0, BLOCKED);
-    let mut w = with(Rules { blocking: Blocking::Creeps, ..PAPER }, setup());
+    let mut w = with(Rules { blocking: CollisionResponse::Creeps, ..PAPER }, setup());
     // The probe, 0.5 m ahead and 0.175 m deep, overlaps the wall of 0.12 m for five more frames.
     assert_eq!(run(&mut w, A, Action::MoveForward), (Outcome::Success, 3), "from standing");
     for _ in 0..4 {
@@ -98,7 +103,7 @@ fn creeping_agents_ignore_street_stalls() {
             hall(vec![thing(class, at(0.0, 0.0, -0.8))], vec![person(Persona::Adult, 0.0, 0.0)]);
         setup.things[1].fixed = true;
         setup.task = task;
-        let mut w = with(Rules { blocking: Blocking::Creeps, ..PAPER }, setup);
+        let mut w = with(Rules { blocking: CollisionResponse::Creeps, ..PAPER }, setup);
         run(&mut w, A, Action::MoveForward).1
     };
     assert_eq!(frames(TaskId::Shopping, "wood_shelving"), 11);
@@ -117,7 +122,7 @@ fn reach_to_the_middle_ignores_walls_and_put_distance() {
     };
     let out_of_reach = Outcome::Failure(FailureReason::OutOfReach);
     assert_eq!(run(&mut with(PAPER, setup()), A, pick(nth(0))).0, out_of_reach);
-    let mut w = with(Rules { reach_to: ReachTo::Middle, ..PAPER }, setup());
+    let mut w = with(Rules { reach_to: ReachReference::Middle, ..PAPER }, setup());
     assert_eq!(run(&mut w, A, pick(nth(0))).0, Outcome::Success);
     assert_eq!(run(&mut w, A, put(nth(1))).0, Outcome::Success, "over the other wall");
 }
@@ -129,7 +134,7 @@ fn furniture_has_its_own_reach_limit() {
         let mut setup = hall(vec![backpack], vec![person(Persona::Helper, 0.0, 0.5)]);
         // The approach ends 0.2 m before the wall's face, 2.4 m from the center of the backpack.
         setup.walls = vec![wall([-5.0, 0.14], [5.0, 0.14])];
-        let rules = Rules { furniture_reach_limit_m, reach_to: ReachTo::Middle, ..PAPER };
+        let rules = Rules { furniture_reach_limit_m, reach_to: ReachReference::Middle, ..PAPER };
         run(&mut with(rules, setup), A, pick(nth(0))).0
     };
     assert_eq!(outcome(2.0), BLOCKED);

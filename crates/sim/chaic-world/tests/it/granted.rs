@@ -4,7 +4,7 @@ use chaic_core::action::{Action, Hand, Outcome};
 use chaic_core::briefing::TaskDisclosure;
 use chaic_core::capability::Persona;
 use chaic_core::geom::Rect;
-use chaic_core::observation::{Granted, Grants, ObjectState};
+use chaic_core::observation::{GrantedInfo, Grants, ObjectState};
 use chaic_core::{AgentId, ClassId, EntityId, ResolvedAction, TaskId, Vec2, Vec3};
 use chaic_world::{Opening, Room, RoomKind, World};
 
@@ -36,7 +36,7 @@ fn rooms() -> World {
     world(setup)
 }
 
-fn granted(w: &World, grants: Grants) -> Granted {
+fn granted(w: &World, grants: Grants) -> GrantedInfo {
     w.granted(B, grants, &[])
 }
 
@@ -118,7 +118,7 @@ fn the_state_lists_movable_objects_and_possible_goal_places_with_their_true_exte
     assert_eq!(listed, ["bed", "wicker_basket", "apple", "trashbin"]);
     assert_eq!(state.goal_places, [EntityId::FIRST_OBJECT]);
     for object in &state.objects {
-        let spec = w.setup().thing(object.entity).expect("it exists");
+        let spec = w.setup().object(object.entity).expect("it exists");
         let size = spec.size_m();
         let center = spec.position + Vec3::Y * 0.5 * size.y;
         assert!(object.position_in_world.distance(center) < 1e-4, "{object:?}");

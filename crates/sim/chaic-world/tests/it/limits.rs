@@ -54,8 +54,8 @@ fn lists_have_a_maximum_length() {
     check_count("walls", Setup::MAX_WALLS, |s, n| s.walls = vec![wall([0.0; 2], [1.0; 2]); n]);
     check_count("openings", Setup::MAX_OPENINGS, |s, n| s.openings = vec![opening; n]);
     check_count("floors", Setup::MAX_FLOORS, |s, n| s.floors = vec![tile; n]);
-    check_count("things", Setup::MAX_THINGS, |s, n| s.things = vec![bed; n]);
-    check_count("goal_places", Setup::MAX_THINGS, |s, n| {
+    check_count("things", Setup::MAX_OBJECTS, |s, n| s.things = vec![bed; n]);
+    check_count("goal_places", Setup::MAX_OBJECTS, |s, n| {
         s.goal_places = vec![Setup::entity(0); n];
     });
 }

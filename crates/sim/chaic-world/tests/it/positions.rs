@@ -15,12 +15,12 @@ fn pick(object: EntityId) -> ResolvedAction {
 }
 
 fn position(w: &World, object: EntityId) -> Vec3 {
-    let index = w.setup().thing_index(object).expect("it exists");
+    let index = w.setup().object_index(object).expect("it exists");
     w.state().objects[index].position
 }
 
 fn size(w: &World, object: EntityId) -> Vec3 {
-    w.setup().thing(object).expect("it exists").size_m()
+    w.setup().object(object).expect("it exists").size_m()
 }
 
 /// Distance in plan, meters.
@@ -91,7 +91,7 @@ fn objects_are_put_on_the_highest_top_beside_each_other() {
         assert_eq!(run(&mut w, A, put).0, Outcome::Success);
         run(&mut w, A, Action::Wait { frames: 60 });
     }
-    let spec = w.setup().thing(bed).expect("the bed");
+    let spec = w.setup().object(bed).expect("the bed");
     let highest = top_surfaces(spec).into_iter().max_by(|a, b| a.center.y.total_cmp(&b.center.y));
     let highest = highest.expect("a bed has a top");
     for object in [nth(0), nth(1)] {

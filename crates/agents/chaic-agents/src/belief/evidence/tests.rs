@@ -65,7 +65,7 @@ impl Observer {
         &mut self,
         frame: Frame,
         detections: &[Detection],
-        grant: impl FnOnce(&mut chaic_core::observation::Granted),
+        grant: impl FnOnce(&mut chaic_core::observation::GrantedInfo),
     ) -> &Evidence {
         self.toy.frame = frame;
         let mut observation = self.toy.observe();

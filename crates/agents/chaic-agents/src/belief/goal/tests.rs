@@ -2,12 +2,12 @@ use chaic_core::capability::Persona;
 
 use super::*;
 use crate::TrackId;
-use crate::belief::evidence::Take;
+use crate::belief::evidence::PickUpEvidence;
 use crate::belief::tests::{evidence_with, failed, house, street, taken, yard};
 
 /// Creates evidence of takes; tracks count from `first`.
 fn takes(first: u32, list: &[(&str, f32)]) -> Evidence {
-    let take = |(class, strength): &(&str, f32)| -> Take { taken(class, *strength) };
+    let take = |(class, strength): &(&str, f32)| -> PickUpEvidence { taken(class, *strength) };
     evidence_with(|e| e.taken = (first..).map(TrackId).zip(list.iter().map(take)).collect())
 }
 

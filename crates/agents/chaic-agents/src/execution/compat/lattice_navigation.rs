@@ -11,7 +11,7 @@ use crate::execution::destination::Destination;
 use crate::execution::navigation::{Approach, NavigationStep, Navigator, PathState};
 use crate::mapping::{CELL_M, CellOccupancy};
 use crate::memory::Memory;
-use crate::planning::compat::lattice_costs::{BLOCKED, FARTHEST};
+use crate::planning::compat::lattice_costs::{BLOCKED, MAX_PATH_COST};
 use crate::planning::compat::straight_path::StraightSearch;
 use crate::planning::path::Path;
 
@@ -99,7 +99,7 @@ impl Navigator for LatticeNavigator {
             && memory.map.state(end) != CellOccupancy::Wall;
         self.path_state = match path.cost {
             _ if is_blocked => PathState::Blocked,
-            cost if cost > FARTHEST => PathState::TooCostly,
+            cost if cost > MAX_PATH_COST => PathState::TooCostly,
             _ => PathState::Open,
         };
         // A blocked path prevents the arrival of exploration, but not an interaction.

@@ -11,7 +11,7 @@ use crate::execution::exploration::ExplorationStep;
 use crate::execution::navigation::{NavigationStep, Navigator, PathState};
 use crate::mapping::CellOccupancy;
 use crate::memory::Memory;
-use crate::planning::compat::lattice_costs::FARTHEST;
+use crate::planning::compat::lattice_costs::MAX_PATH_COST;
 use crate::planning::compat::straight_path::StraightCostField;
 
 /// Arrival distance, and minimum distance of a new target, meters.
@@ -75,7 +75,7 @@ impl RandomExplorer {
         let (costs, _) = memory.costs_and_search();
         let grid = *costs.grid();
         let start = grid.cell_at(here)?;
-        let field = StraightCostField::new(&grid, costs.costs(), start, FARTHEST);
+        let field = StraightCostField::new(&grid, costs.costs(), start, MAX_PATH_COST);
         let inner = |cell: &usize| {
             let (i, j) = grid.column_row(*cell);
             (BORDER..grid.nx() - BORDER).contains(&i) && (BORDER..grid.nz() - BORDER).contains(&j)

@@ -8,7 +8,7 @@ use chaic_core::{Frame, Role, Vec2};
 
 use crate::mapping::grid::{CELL_M, Grid};
 use crate::mapping::occupancy::CellOccupancy;
-use crate::planning::cost_map::{CostMap, FREE, UNKNOWN_EXTRA};
+use crate::planning::cost_map::{CostMap, FREE, UNKNOWN_CELL_COST};
 use crate::planning::cost_model::{CostInputs, CostModel, MapChanges};
 use crate::track::TrackId;
 
@@ -32,7 +32,7 @@ const OBSTACLE_CELLS: [i32; 2] = [5, 6];
 /// A path that costs more than this passes an obstacle or a wall (facts A1.6).
 pub const BLOCKED: u32 = 500_000 * FREE;
 /// A path that costs more than this is not worth exploring (facts A1.10).
-pub const FARTHEST: u32 = 10_000 * FREE;
+pub const MAX_PATH_COST: u32 = 10_000 * FREE;
 /// Number of updates after which cells that have become free are accepted as free (facts A1.1: 10).
 const ACCEPT_FREE_EVERY: u32 = 10;
 /// Time for which a person's last position counts as occupied, frames.
@@ -195,7 +195,7 @@ fn lattice_costs(
         let place = if *is_near { NEAR[0] } else { FREE };
         let place = if *is_adjacent { NEAR[1] } else { place };
         let place = if *is_occupied { occupied_cost } else { place };
-        let unknown = if cell.is_known() { 0 } else { UNKNOWN_EXTRA };
+        let unknown = if cell.is_known() { 0 } else { UNKNOWN_CELL_COST };
         let wall = if *is_wall { WALL_EXTRA } else { 0 };
         let true_wall = if cell.is_tall() { TRUE_WALL_EXTRA } else { 0 };
         *cost = place + unknown + wall + true_wall;

@@ -5,7 +5,7 @@ use chaic_core::rng::RngStream;
 
 use super::*;
 use crate::PlannerRules;
-use crate::belief::{LAST_DELIVERY_FRAMES, Take};
+use crate::belief::{LAST_DELIVERY_FRAMES, PickUpEvidence};
 use crate::decision::valid_plans;
 use crate::perception::{Detection, Percepts};
 use crate::test_support::{Toy, carried, hands, seen, seen_partner};
@@ -83,7 +83,8 @@ impl Episode {
     }
 
     fn take(&mut self, track: u32, class: &str) {
-        let take = Take { class: ClassId::named(class), strength: 1.0, frame: 0, top_m: None };
+        let take =
+            PickUpEvidence { class: ClassId::named(class), strength: 1.0, frame: 0, top_m: None };
         let belief = self.policy.belief.as_mut().expect("the episode has begun");
         belief.evidence.taken.insert(TrackId(track), take);
     }
@@ -181,7 +182,7 @@ fn without_evidence_it_follows_a_visible_partner_and_explores_otherwise() {
         assert_eq!(plans[17..], [then, then], "after 18 turns");
     }
     assert_eq!(episode.policy.identified, None);
-    let options = InferOptions::NO_WATCHING;
+    let options = InferOptions::WITHOUT_FOLLOWING;
     let mut episode = Episode::ready(options, house);
     assert_eq!(episode.step(10, &with_partner), Plan::Explore, "it never watches");
 }
@@ -219,7 +220,7 @@ fn late_in_the_episode_it_acts_without_a_clear_goal() {
     let horizon = episode.briefing.horizon;
     // An object vanished, which may have been overlooked.
     let class = ClassId::named("apple");
-    let take = Take { class, strength: 0.3, frame: 0, top_m: None };
+    let take = PickUpEvidence { class, strength: 0.3, frame: 0, top_m: None };
     let belief = episode.policy.belief.as_mut().expect("the episode has begun");
     belief.evidence.taken.insert(TrackId(60), take);
     for fraction in [0.0, 0.2] {

@@ -7,7 +7,7 @@ use crate::behavior::ObservedInteraction;
 use crate::decision::{filtered_plans, valid_plans};
 use crate::memory::Memory;
 use crate::test_support::{Toy, carried, hands, seen, seen_partner};
-use crate::track::Carried;
+use crate::track::CarriedObject;
 use chaic_core::briefing::Companion;
 use chaic_core::rng::RngStream;
 use chaic_core::{Action, AgentId, EntityId, Hand, Vec3};
@@ -20,7 +20,7 @@ fn subject(class: &str, track: u32) -> Subject {
 struct Case {
     name: &'static str,
     frame: Frame,
-    hands: [Option<Carried>; 2],
+    hands: [Option<CarriedObject>; 2],
     valid: Vec<Plan>,
     expected: Plan,
 }
@@ -233,7 +233,7 @@ const PIANO: TrackId = TrackId(50);
 const STRONG_KG: f32 = 1000.0;
 
 /// Returns what one hand holds, drawn at random.
-fn random_load(rng: &mut RngStream, track: u16) -> Option<Carried> {
+fn random_load(rng: &mut RngStream, track: u16) -> Option<CarriedObject> {
     match rng.below(10) {
         0..6 => None,
         6 | 7 => Some(carried("apple", track, &[])),

@@ -48,13 +48,13 @@ fn problems(path: &Path, helpers: &TestHelpers) -> String {
     let findings = report.findings.iter().map(ToString::to_string);
     let warnings = report.warnings.iter().map(ToString::to_string);
     let mut problems: Vec<String> = mismatches.chain(findings).chain(warnings).collect();
-    if !report.report.is_good() {
+    if !report.report.has_passed() {
         problems.push(format!("{:?}", report.report));
     }
     if !report.coverage.is_complete() {
         problems.push(report.coverage.to_string());
     }
-    assert_eq!(problems.is_empty(), report.is_good(), "{problems:?}");
+    assert_eq!(problems.is_empty(), report.has_passed(), "{problems:?}");
     problems.join("\n")
 }
 

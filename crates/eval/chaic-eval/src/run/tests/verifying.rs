@@ -192,7 +192,7 @@ fn verification_counts_results_and_compares_the_report() {
     };
     let files = ["scores.json", "report.md", "figure.svg"];
     assert_eq!(report().report, compared(&files, &[]));
-    assert!(!report().is_good() && report().findings.is_empty());
+    assert!(!report().has_passed() && report().findings.is_empty());
     // Results without diagnostic metrics, and with a wrong value.
     let journal = run.folder().results();
     let lines = fs::read_to_string(&journal).unwrap();
@@ -225,7 +225,7 @@ fn verification_counts_results_and_compares_the_report() {
     };
     crate::report::write_files(run.folder(), &run_report).unwrap();
     assert_eq!(report().report, compared(&[], &[]));
-    assert!(report().is_good());
+    assert!(report().has_passed());
     assert_eq!(report().coverage.to_string(), "4 of 4 episode runs are finished");
     for name in files {
         let file = run.folder().join(name);
@@ -233,7 +233,7 @@ fn verification_counts_results_and_compares_the_report() {
         for other in [text.replacen('0', "1", 1), format!("{text}\n"), String::new()] {
             fs::write(&file, other).unwrap();
             assert_eq!(report().report, compared(&[], &[name]));
-            assert!(!report().is_good());
+            assert!(!report().has_passed());
         }
         fs::write(&file, text).unwrap();
     }
@@ -247,16 +247,16 @@ fn verification_counts_results_and_compares_the_report() {
         coverage.contains("3 of 4 episode runs are finished; missing: 1, first "),
         "{coverage}"
     );
-    assert!(!report().is_good());
+    assert!(!report().has_passed());
     let key: RunKey = serde_json::from_str::<RunResult>(first).unwrap().key;
     let status = RunStatus::Error { message: "the episode broke down: out of ideas".to_owned() };
     let broken = serde_json::to_string(&RunResult { key, status }).unwrap();
     fs::write(&journal, format!("{broken}\n{rest}")).unwrap();
     let coverage = report().coverage.to_string();
     assert!(coverage.contains("3 of 4 episode runs are finished; failed: 1, first "), "{coverage}");
-    assert!(!report().is_good());
+    assert!(!report().has_passed());
     fs::write(&journal, &lines).unwrap();
-    assert!(report().is_good());
+    assert!(report().has_passed());
 
     // A trace of another version concerns the whole run, so the error is one line.
     let trace = run.folder().traces().unwrap().remove(1);

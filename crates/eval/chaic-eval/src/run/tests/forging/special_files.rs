@@ -142,7 +142,7 @@ fn a_resumed_run_does_not_follow_links() {
 }
 
 /// Lists paths, kinds and lengths of all entries below a path.
-fn entries_with_lengths(path: &Path) -> Vec<(chaic_files::Entry, u64)> {
+fn entries_with_lengths(path: &Path) -> Vec<(chaic_files::DirectoryEntry, u64)> {
     let found = chaic_files::walk(path, 9).unwrap().into_iter();
     found.map(|e| (e.clone(), fs::symlink_metadata(&e.path).unwrap().len())).collect()
 }
